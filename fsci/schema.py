@@ -24,6 +24,8 @@ length, mass and time.
   `where(condition, a, b)` is a where the condition holds, else b; `ramp(t, a, b)` rises from 0 at a to 1 at b, its
   first two derivatives being zero at both ends. The functions of the section `curves` belong to them.
 - A *name* has letters, digits, `_` and `-`.
+- `include: FILE` in a section stands for the settings in another YAML file, or for its list. Settings beside it win.
+  Names of files in either file count from the folder of the file that is the case.
 - `<<: *other` takes over the settings of a section marked `&other`.
 """
 
@@ -33,12 +35,39 @@ COMMON = ("order", "cell", "mirror", "rotate", "translate")
 
 def json_schema() -> str:
     """JSON schema of the case format."""
-    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **_schema()}, indent=2)
+    schema = _with_include(_schema())
+    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
 
 
 def _schema() -> dict[str, Any]:
     """The schema of all models; the name of a section is that of its model without `Section`."""
     return json.loads(re.sub(r"(\w)Section\b", r"\1", json.dumps(Case.model_json_schema())))
+
+
+#: Of a section, and of the section in place of a list of sections.
+FILE_OF_PART = {"^include$": {"type": "string", "description": "a file with these settings, or with the list"}}
+
+
+def _with_include(schema: dict[str, Any]) -> dict[str, Any]:
+    """The schema in which sections, and lists of them, may be in a file; then it has the required settings."""
+    found = dict(schema)
+    for key in ("$defs", "properties"):
+        if key in schema:
+            found[key] = {name: _with_include(one) for name, one in schema[key].items()}
+    for key in ("anyOf", "oneOf"):
+        if key in schema:
+            found[key] = [_with_include(one) for one in schema[key]]
+    for key in ("items", "additionalProperties"):
+        if isinstance(schema.get(key), dict):
+            found[key] = _with_include(schema[key])
+    if schema.get("type") == "object":
+        found["patternProperties"] = FILE_OF_PART
+        if required := found.pop("required", None):
+            found |= {"if": {"required": ["include"]}, "else": {"required": required}}
+    elif schema.get("type") == "array" and _references(schema):
+        found |= {"type": ["array", "object"], "patternProperties": FILE_OF_PART, "required": ["include"]}
+        found["additionalProperties"] = False
+    return found
 
 
 def reference_markdown() -> str:

@@ -68,6 +68,7 @@ EXAMPLES = {
     "Damping": "damping: {mass: 0.1, stiffness: 1e-3}",
     "Body": BODY,
     "FileMesh": "mesh: {file: flag.geo, order: 2, parameters: {refine: 2}}",
+    "MeshSurface": ("surfaces:\n  top: {normal: [0, 0, 1], within: 5}\n  hole: {box: [[0.4, 0.4, 0], [0.6, 0.6, 1]]}"),
     "Rotation": "rotate: [{angle: 90, axis: [0, 0, 1]}, {angle: 30, axis: [1, 0, 0]}]",
     "Support": (
         'supports:\n  - {on: bottom, displacement: [0, 0, 0]}\n  - {on: top, displacement: [null, null, "-0.1*t"]}\n'

@@ -150,7 +150,8 @@ def _body(case: Case, name: str, mesh: Mesh) -> Candidate:
 def _obstacle(case: Case, name: str) -> Candidate:
     assert case.contact is not None
     mesh = read_obstacle(case, name)
-    found = [face(mesh, [surface]) for surface in case.contact.obstacles[name].on]
+    on = case.contact.obstacles[name].on
+    found = [face(mesh, None)] if on is None else [face(mesh, [surface]) for surface in on]
     return Candidate({"obstacle": name}, found, np.inf)
 
 

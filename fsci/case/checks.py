@@ -196,7 +196,7 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
             yield from movement_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
         else:
             yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
-        yield from surfaces_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
+        yield from surfaces_mistakes(obstacle.mesh, obstacle.on or (), (*keys, "on"))
         if case.fluid is not None and name in case.fluid.bodies:
             remedy = "remove the obstacle and take the body as master"
             yield keys, f"'{name}' is also the name of a rigid body of the flow; {remedy}"

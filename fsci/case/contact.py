@@ -152,8 +152,11 @@ class PairSection(Section):
 class ObstacleSection(Section):
     """A rigid surface, at rest, moved as given, or free: a tool on which given forces act."""
 
-    mesh: Mesh = setting(..., "mesh file or built-in shape that has the surface")
-    on: Surfaces = setting(..., "name of the surface, or list of names that are one surface together")
+    mesh: Mesh = setting(..., "mesh file, also of a closed surface (STL, OBJ), or built-in shape that has the surface")
+    on: Surfaces | None = setting(
+        None,
+        "name of the surface, or list of names that are one surface together; default: the whole boundary of the mesh",
+    )
     motion: ObstacleMotion | None = setting(
         None, "displacement, or a rigid motion with its rotation; default: at rest", unit="m"
     )

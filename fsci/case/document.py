@@ -8,7 +8,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ from ruamel.yaml.anchor import Anchor
 from ruamel.yaml.comments import merge_attrib
 
 from fsci.case.errors import CaseError, Place, Problem
-from fsci.case.plain_file import Unreadable, read_file
+from fsci.case.include import INCLUDE, includes, read_parts, read_text
+from fsci.case.plain_file import Unreadable
 from fsci.case.yaml_text import Keys, Parsed, parse_yaml
 
 
@@ -29,6 +30,7 @@ class Document:
     text: str
     overrides: tuple[tuple[str, str], ...] = ()  #: dotted name, value as YAML text
     parsed: Parsed = field(default_factory=Parsed, repr=False)
+    parts: dict[str, str] = field(default_factory=dict, repr=False)  #: name of an included file -> its text
 
     @property
     def data(self) -> Any:
@@ -54,13 +56,16 @@ class Document:
         return Place(first.source, first.line, first.column + column - 1)
 
     def problem(self, place: Place, message: str) -> Problem:
-        lines = self.text.split("\n")
+        lines = self.parts.get(place.source, self.text).split("\n")
         line = lines[place.line - 1].rstrip() if 0 < place.line <= len(lines) else ""
         return Problem(place, message, line)
 
     def dump(self) -> str:
-        """The text of the case with its overrides; comments stay, as far as the text then means these settings."""
-        if not self.overrides:
+        """The text of the case with included files and overrides in it.
+
+        Comments beside settings stay, as far as the text then means these settings.
+        """
+        if not self.overrides and not self.parts:
             return self.text
         return next(text for write in (_with_comments, _plainly) if (text := write(self)) and self._is(text))
 
@@ -80,7 +85,7 @@ def _with_comments(document: Document) -> str:
     yaml.width = 4096  # no line is broken that was not
     try:
         with warnings.catch_warnings(action="ignore"):  # of anchors of one name, which YAML allows
-            data = yaml.load(document.text)
+            data = _whole(document, document.path, yaml.load(document.text), yaml)
         for dotted, text in document.overrides:
             _unshare(data, dotted)
             *_, (inner, last) = _steps(data, dotted)
@@ -88,6 +93,24 @@ def _with_comments(document: Document) -> str:
         return _written(yaml, data)
     except (YAMLError, LookupError, TypeError, ValueError, AttributeError):
         return ""
+
+
+def _whole(document: Document, path: Path, data: Any, yaml: YAML) -> Any:
+    """The data of a file with those of included files in it; a section of the file with more settings stays first."""
+    for key in list(data) if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ():
+        inner = data[key]
+        if isinstance(inner, dict | list) and (whole := _whole(document, path, inner, yaml)) is not inner:
+            data[key] = whole
+    if not includes(data):
+        return data
+    file = path.parent / data[INCLUDE]
+    part = _whole(document, file, yaml.load(document.parts[str(file)]), yaml)
+    if len(data) == 1:
+        return part
+    for name, value in part.items():
+        data.setdefault(name, value)
+    del data[INCLUDE]
+    return data
 
 
 def _unshare(data: Any, dotted: str) -> None:
@@ -134,22 +157,14 @@ def _written(yaml: Any, data: Any) -> str:
     return stream.getvalue()
 
 
-#: Size [bytes] of a case file: the reader takes a minute for more.
-MOST_BYTES_OF_CASE = 1_000_000
-
-
 def read_document(path: Path) -> Document:
-    """Read a case file; raises CaseError."""
+    """Read a case file and those that it includes; raises CaseError."""
     try:
-        raw = read_file(path, MOST_BYTES_OF_CASE)
-        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+        text = read_text(path)
     except Unreadable as error:
         raise CaseError([Problem(Place(str(path)), str(error))]) from None
-    except UnicodeDecodeError as error:
-        before = error.object[: error.start].decode("utf-8")
-        place = Place(str(path), before.count("\n") + 1, len(before) - before.rfind("\n"))
-        raise CaseError([Problem(place, "the file is not UTF-8 text")]) from None
-    return Document(path, text, parsed=parse_yaml(text, str(path)))
+    parsed, parts = read_parts(path, text)
+    return Document(path, text, parsed=parsed, parts=parts)
 
 
 def override(document: Document, dotted: str, text: str) -> Document:
@@ -174,7 +189,7 @@ def override(document: Document, dotted: str, text: str) -> Document:
         places |= {path: place for path, place in old_places.items() if path[: len(keys)] != keys}
         places |= {keys + path: here for path in new_places}
         setattr(parsed, name, places)
-    return Document(document.path, document.text, (*document.overrides, (dotted, text)), parsed)
+    return replace(document, overrides=(*document.overrides, (dotted, text)), parsed=parsed)
 
 
 def _steps(data: Any, dotted: str) -> list[tuple[Any, str | int]]:

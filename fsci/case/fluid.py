@@ -145,7 +145,9 @@ def _one_of(section: Section, first: str, second: str) -> None:
 class RigidBodySection(Section):
     """A rigid body in the flow: at rest, moved as given, or free."""
 
-    mesh: Mesh = setting(..., "mesh file or built-in shape; only the facets of its boundary are used")
+    mesh: Mesh = setting(
+        ..., "mesh file, or one of a closed surface (STL, OBJ), or built-in shape; its boundary counts"
+    )
     on: Surfaces | None = setting(
         None, "names of the surfaces that enclose the body; default: the whole boundary of the mesh"
     )

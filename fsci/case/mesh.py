@@ -4,16 +4,50 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from fsci.case.section import fault, setting
+from fsci.case.section import Section, fault, setting
 from fsci.case.shapes import AnyShape, PlacedMesh
-from fsci.case.values import CountOrZero, Name, Number, Order, Positive, Text, chosen, describe_value
+from fsci.case.values import (
+    CountOrZero,
+    EntryCount,
+    Name,
+    Number,
+    NumberVector,
+    Order,
+    Positive,
+    Text,
+    chosen,
+    describe_value,
+)
 from fsci.shapes import SHAPES
 
 
+class MeshSurface(Section):
+    """A named surface of a mesh file: the facets of its boundary with this normal, in this box, or both.
+
+    Coordinates are those of the file times `scale`, before the mesh is mirrored, turned or moved.
+    """
+
+    normal: NumberVector | None = setting(None, "direction of their outward normals, of any length", unit="1")
+    within: Positive = setting(10.0, "largest angle between a normal and this one", unit="degrees")
+    box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
+        None, "lowest and highest corner of a box around all of their corners", unit="m"
+    )
+
+    @model_validator(mode="after")
+    def _some(self) -> MeshSurface:
+        if self.normal is None and self.box is None:
+            raise fault("a surface needs 'normal', 'box' or both")
+        if self.normal is not None and not any(self.normal):
+            raise fault("must not be zero", "normal")
+        if self.normal is None and "within" in self.model_fields_set:
+            raise fault("'within' belongs to 'normal'", "within")
+        return self
+
+
 class FileMesh(PlacedMesh):
-    """A mesh from a file: gmsh's .geo or .msh with physical names, or any format that meshio reads.
+    """A mesh from a file: gmsh's .geo or .msh with physical names, .unv, or any format that meshio reads.
 
     All cells are of one type: triangles or tetrahedra of first or second order, quadrilaterals or hexahedra of first or
     full second order. Cells with 8 and 20 nodes get nodes in the middle, so that they have 9 and 27. Prisms, pyramids
@@ -29,6 +63,10 @@ class FileMesh(PlacedMesh):
         "extrusions stay (.geo only)",
         unit="1",
     )
+    scale: Positive = setting(
+        1.0, "factor of all coordinates of the file, before anything else: 0.001 for a file in mm", unit="1"
+    )
+    surfaces: dict[Name, MeshSurface] = setting(dict, "more surfaces by name, where the file has no names")
     refine: CountOrZero = setting(
         0, "how often edges are halved, so that each cell becomes four, in 3D eight; the surface stays what it is"
     )

@@ -16,7 +16,9 @@ from fsci.case.values import Name, Surfaces, Vector
 class FreeBodySection(FreeMotion):
     """A free rigid body."""
 
-    mesh: Mesh = setting(..., "mesh file or built-in shape; only the facets of its boundary are used")
+    mesh: Mesh = setting(
+        ..., "mesh file, or one of a closed surface (STL, OBJ), or built-in shape; its boundary counts"
+    )
     on: Surfaces | None = setting(
         None, "names of the surfaces that enclose the body; default: the whole boundary of the mesh"
     )

@@ -1,4 +1,4 @@
-"""Mesh files: gmsh's own through gmsh, any other format through meshio, to one `Mesh` with named parts."""
+"""Mesh files: gmsh's own and UNV through gmsh, any other format through meshio, to one `Mesh` with named parts."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.meshes.parts import beside
-from fsci.meshes.scripts import GMSH, SCRIPTS, RefusedScript, require_harmless
+from fsci.meshes.scripts import GMSH, MESHES, SCRIPTS, RefusedScript, require_harmless
 from fsci.meshes.serendipity import COMPLETE, complete
+from fsci.meshes.surface import BadSurface, cones, split
 from solvers.mesh.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.topology import boundary_facets, find_facets, signed_volumes
@@ -28,6 +29,10 @@ MESHED = tuple(name for name, cell_type in CELL_TYPES.items() if cell_type.facet
 
 class MeshError(Exception):
     """A mesh that cannot be built; the message gives the user the reason."""
+
+    def __init__(self, message: str, *keys: str | int):
+        super().__init__(message)
+        self.keys = keys  #: from the section of the mesh to the setting that is wrong
 
 
 def unknown(kind: str, name: str, names: Iterable[str]) -> MeshError:
@@ -64,9 +69,16 @@ class Content:
 
 
 def read_mesh(
-    path: Path, order: int | None = None, parameters: Mapping[str, float] | None = None, size_factor: float = 1.0
+    path: Path,
+    order: int | None = None,
+    parameters: Mapping[str, float] | None = None,
+    size_factor: float = 1.0,
+    *,
+    rigid: bool = False,
 ) -> Mesh:
     """The mesh of a file; `order` (1 or 2), `parameters` (for DefineConstant) and `size_factor` are for .geo scripts.
+
+    rigid: a closed surface is enough.
 
     Raises MeshError: file missing or unreadable, unknown parameter, several cell types or a foreign one, a script that
     would do more than make a mesh.
@@ -84,13 +96,15 @@ def read_mesh(
         raise MeshError(f"parameters are for .geo files, {path.name} has none")
     elif size_factor != 1.0:
         raise MeshError(f"'size_factor' is for .geo files, the cells of {path.name} have their sizes")
-    elif path.suffix == ".msh":
+    elif path.suffix in MESHES:
         content = _read_gmsh(path, None, {})
     else:
         content = _read_meshio(path)
     try:
+        if rigid and _in_space(content):
+            return _enclosed(content)
         return _mesh(content, scripted=path.suffix in SCRIPTS)
-    except MeshError as error:
+    except (MeshError, BadSurface) as error:
         raise MeshError(f"{path.name}: {error}") from None
 
 
@@ -126,6 +140,42 @@ def _mesh(content: Content, *, scripted: bool) -> Mesh:
     )
 
 
+def _in_space(content: Content) -> bool:
+    """Whether the cells are a surface in space."""
+    faces = [block.nodes for block in content.blocks if block.dim == 2]
+    if not faces or any(block.dim == 3 for block in content.blocks):
+        return False
+    points = content.points[np.unique(np.concatenate([nodes.ravel() for nodes in faces]))]
+    return points.shape[1] > 2 and not _is_plane(points)
+
+
+def _enclosed(content: Content) -> Mesh:
+    """The body in a closed surface of triangles and quadrilaterals, with its groups as surfaces."""
+    points = np.asarray(content.points[:, :3], dtype=float)  # behind them there may be colours
+    triangles: list[Indices] = []
+    numbers: list[Indices] = []
+    starts, count = {}, 0
+    for number, block in enumerate(content.blocks):
+        if block.dim != 2:
+            continue
+        if block.cell_type not in ("triangle", "quad"):
+            raise MeshError(f"the facets are {block.cell_type}; those of a surface are triangle and quad")
+        _require_positions(points, np.unique(block.nodes))
+        nodes = block.nodes if block.cell_type == "triangle" else split(points, block.nodes)
+        each = len(nodes) // len(block.nodes)
+        starts[number] = len(np.concatenate(triangles)) if triangles else 0, each
+        numbers.append(count + 1 + np.repeat(np.arange(len(block.nodes)), each))
+        triangles.append(nodes)
+        count += len(block.nodes)
+    surfaces: dict[str, Indices] = {}
+    for name, number, cells in content.groups:
+        if number in starts:
+            start, each = starts[number]
+            those = start + (each * cells[:, None] + np.arange(each)).ravel()
+            surfaces[name] = np.union1d(surfaces.get(name, those), those)
+    return cones(points, np.concatenate(triangles), np.concatenate(numbers), surfaces)
+
+
 def _completed(content: Content) -> tuple[Content, str]:
     """Convert cells of 8 and 20 nodes to those of 9 and 27, with a note to the user."""
     types = sorted({(-block.dim, block.cell_type) for block in content.blocks if block.cell_type in COMPLETE})
@@ -158,10 +208,18 @@ def _require_positions(points: NDArray[np.float64], used: Indices) -> None:
 
 def _positions(points: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
     """A mesh of plane cells keeps x and y only."""
-    across = points[:, dim:]
-    if across.size and np.ptp(across, axis=0).max() > 1e-9 * np.ptp(points, axis=0).max():
-        raise MeshError("the cells are a surface in space; a plane mesh must have the same z everywhere")
+    if dim == 2 and not _is_plane(points):
+        raise MeshError(
+            "the cells are a surface in space; an elastic body needs cells of its volume, or the same z everywhere; "
+            "of a rigid body or an obstacle a closed surface is enough"
+        )
     return np.ascontiguousarray(points[:, :dim], dtype=float)
+
+
+def _is_plane(points: NDArray[np.float64]) -> bool:
+    """Whether points have the same z."""
+    across = points[:, 2:]
+    return not across.size or bool(np.ptp(across, axis=0).max() <= 1e-9 * np.ptp(points, axis=0).max())
 
 
 def _positive(mesh: Mesh) -> tuple[Indices, str]:
@@ -241,7 +299,7 @@ def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float], s
         if parameters:
             _set_parameters(path, parameters)
         _merge(path)
-        if path.suffix != ".msh":
+        if path.suffix not in MESHES:
             _check_parameters(path, parameters)
             if order is not None:
                 gmsh.option.setNumber("Mesh.ElementOrder", order)
@@ -354,6 +412,8 @@ def _read_meshio(path: Path) -> Content:
         reason = printed.getvalue().strip() or str(error) or type(error).__name__
         raise MeshError(f"{path.name}: meshio says: {' '.join(reason.split())}") from None
     blocks = [Block(block.type, block.dim, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+    if any(block.nodes.min(initial=0) < 0 or block.nodes.max(initial=-1) >= len(mesh.points) for block in blocks):
+        raise MeshError(f"{path.name}: cells name nodes that are not there, or count them from the end; write it anew")
     point_sets = {name: np.asarray(nodes, dtype=np.int64) for name, nodes in mesh.point_sets.items()}
     return Content(np.asarray(mesh.points), blocks, list(_meshio_groups(mesh)), point_sets)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.meshes.files import MeshError, read_mesh, unknown
+from fsci.meshes.named import with_surfaces
 from fsci.meshes.refine import refined
 from fsci.rotation import rotation_matrix
 from solvers.mesh.cell_types import CELL_TYPES
@@ -20,13 +21,19 @@ from solvers.mesh.topology import find_facets
 MOST_CELLS = 10**8  #: of a refined mesh
 
 
-def build_mesh(settings: Any, folder: Path) -> Mesh:
-    """The mesh of a case's `mesh:` section; file names count from `folder`. Raises MeshError."""
+def build_mesh(settings: Any, folder: Path, *, rigid: bool = False) -> Mesh:
+    """The mesh of a case's `mesh:` section; file names count from `folder`. Raises MeshError.
+
+    rigid: of a file a closed surface is enough.
+    """
     if getattr(settings, "shape", None) is not None:
         mesh = settings.plan.mesh()
     else:
         order, parameters = getattr(settings, "order", None), getattr(settings, "parameters", None)
-        mesh = read_mesh(folder / settings.file, order, parameters, getattr(settings, "size_factor", 1.0))
+        size_factor = getattr(settings, "size_factor", 1.0)
+        mesh = read_mesh(folder / settings.file, order, parameters, size_factor, rigid=rigid)
+        mesh = replace(mesh, points=mesh.points * getattr(settings, "scale", 1.0))
+        mesh = with_surfaces(mesh, getattr(settings, "surfaces", {}))
         mesh = _refined(mesh, getattr(settings, "refine", 0))
     if getattr(settings, "mirror", None) is not None:
         mesh = mirrored(mesh, "xyz".index(settings.mirror))

@@ -84,7 +84,7 @@ def read_body(case: Case, name: str) -> Mesh:
             if keys[0] == "contact":
                 surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
+        raise case.error((*keys, *getattr(error, "keys", ())), str(error)) from None
     case.meshes[f"structure.bodies.{name}"] = mesh_checksum(mesh)
     _check_lengths(case, name, mesh.points.shape[1])
     require_finite(case, name, mesh, find_locations(case, name, mesh))
@@ -94,6 +94,8 @@ def read_body(case: Case, name: str) -> Mesh:
 def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:
     """Raises MeshError for a mesh with wrong cells. Those of built-in shapes may be too coarse for their curvature."""
     try:
+        if mesh.cones:
+            return
         if isinstance(settings, FileMesh):
             require_valid(mesh, parts_meet=parts_meet)
         else:
@@ -154,7 +156,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
     base: Keys = settings.keys
     keys = (*base, "mesh")
     try:
-        mesh = build_mesh(settings.mesh, case.folder)
+        mesh = build_mesh(settings.mesh, case.folder, rigid=True)
         if mesh.points.shape[1] != (dim or mesh.points.shape[1]):
             other = "the grid" if case.fluid is not None else "another body"
             raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but {other} is {dim}D")
@@ -166,7 +168,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
         if not is_closed(facets):
             raise MeshError("these surfaces do not enclose the body: name all of them")
     except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
+        raise case.error((*keys, *getattr(error, "keys", ())), str(error)) from None
     case.meshes[".".join(settings.keys)] = mesh_checksum(mesh)
     if dim is None and (free := (case.rigid or {}).get(name)) is not None:
         whole = base if base[0] == "rigid" else (*base, "free")
@@ -182,16 +184,16 @@ def read_obstacle(case: Case, name: str) -> Mesh:
     obstacle = case.contact.obstacles[name]
     keys: Keys = ("contact", "obstacles", name, "mesh")
     try:
-        mesh = build_mesh(obstacle.mesh, case.folder)
+        mesh = build_mesh(obstacle.mesh, case.folder, rigid=True)
         if case.dimension not in (None, mesh.points.shape[1]):
             raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the bodies are {case.dimension}D")
         _require_valid(obstacle.mesh, mesh, parts_meet=True)
         keys = ("contact", "obstacles", name, "on")
-        for surface in obstacle.on:
+        for surface in obstacle.on or ():
             require_surface(mesh, surface)
             surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
+        raise case.error((*keys, *getattr(error, "keys", ())), str(error)) from None
     case.meshes[f"contact.obstacles.{name}"] = mesh_checksum(mesh)
     return mesh
 

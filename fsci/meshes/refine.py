@@ -55,6 +55,7 @@ def refined(mesh: Mesh) -> Mesh:
         nodes={name: own[those] for name, those in mesh.nodes.items()},
         numbers=np.repeat(number, count),
         note=mesh.note,
+        cones=mesh.cones,
     )
 
 

@@ -27,7 +27,8 @@ GEOMETRY = {".stl", ".brep", ".brp", ".step", ".stp", ".iges", ".igs", ".xao", "
 
 #: Endings of scripts, and of the files that gmsh reads here.
 SCRIPTS = (".geo", ".geo_unrolled")
-GMSH = (*SCRIPTS, ".msh")
+MESHES = (".msh", ".unv")
+GMSH = (*SCRIPTS, *MESHES)
 
 #: Characters of a text; gmsh's parser ends longer ones in the middle, after 1023.
 LONGEST_TEXT = 1000
@@ -51,7 +52,7 @@ class Token(NamedTuple):
 
 def require_harmless(path: Path) -> None:
     """Raises RefusedScript if gmsh could run a program or write a file when it reads this one."""
-    _check(path, set(), script=path.suffix != ".msh")
+    _check(path, set(), script=path.suffix not in MESHES)
 
 
 def _check(path: Path, seen: set[Path], *, script: bool) -> None:

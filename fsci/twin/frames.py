@@ -115,7 +115,7 @@ class _Sections:
     def mesh(self, mesh: PlacedMesh) -> dict[str, Any]:
         """R (M x) + t in other coordinates Q: Q R M = (Q R Q^T) Q M, or (Q R) M where Q is a rotation."""
         given = {
-            (field.alias or name): getattr(mesh, name)
+            (field.alias or name): mesh.model_dump(include={name}, exclude_unset=True)[name]
             for name, field in type(mesh).model_fields.items()
             if name in mesh.model_fields_set and name not in ("mirror", "rotate", "translate")
         }

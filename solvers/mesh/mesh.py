@@ -29,3 +29,4 @@ class Mesh:
     unmoved: NDArray[np.float64] | None = None  #: positions [m] before nodes of tied surfaces moved, (n, dim)
     numbers: NDArray[np.int64] | None = None  #: of the cells in the file, from 1 on; None: they are all, in their order
     note: str = ""  #: note to the user on changes when the mesh was read
+    cones: bool = False  #: of a closed surface: the cells are no more than signed cones to its facets

@@ -92,6 +92,27 @@ def test_size_factor_of_a_mesh(tmp_path):
         build(tmp_path, "one.vtu", size_factor=2.0)
 
 
+@pytest.mark.parametrize("name", ["part.geo", "part.msh", "part.vtu"])
+def test_scale_is_before_all_else(name, tmp_path):
+    """A script, a mesh of gmsh and another file in mm, halved, mirrored, turned, moved: as one in m."""
+    script = QUARTER + QUADS + EXTRUDED % "Recombine;"
+    (tmp_path / "part.geo").write_text(script)
+    mesh = build(tmp_path, "part.geo", order=1, parameters={})
+    if name != "part.geo":
+        named = {key: np.unique(facets) for key, facets in mesh.surfaces.items()}
+        form = {"file_format": "gmsh22", "binary": False} if name == "part.msh" else {}
+        cells = [(mesh.cell_type, mesh.cells)]
+        meshio.Mesh(mesh.points, cells, point_sets={} if form else named).write(tmp_path / name, **form)
+    turn = SimpleNamespace(axis=[1, 2, 3], angle=20.0)
+    placed = {"mirror": "x", "rotate": [turn], "refine": 1}
+    own = build(tmp_path, name, **placed, translate=[1.0, 2.0, 3.0])
+    other = build(tmp_path, name, **placed, scale=1e-3, translate=[1e-3, 2e-3, 3e-3])
+    assert other.points == pytest.approx(1e-3 * own.points, rel=1e-12, abs=1e-15)
+    assert np.array_equal(other.cells, own.cells)
+    assert other.surfaces.keys() == own.surfaces.keys()
+    assert volume(other) == pytest.approx(0.375e-9 * pi, rel=0.05)
+
+
 def test_parameters_reach_the_script(tmp_path):
     (tmp_path / "part.geo").write_text(QUARTER + QUADS + NAMES + "fixed = 1;\n")
     assert len(build(tmp_path, "part.geo", order=1, parameters={}).cells) == 2 * 4
@@ -261,6 +282,38 @@ def test_families_of_med(tmp_path):
     mesh = build(tmp_path, "square.med")
     assert {name: list(cells) for name, cells in mesh.regions.items()} == {"all": [0, 1], "upper": [1]}
     assert np.array_equal(mesh.points[mesh.surfaces["left"]], [[[0, 1], [0, 0]]])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_groups_of_unv(order, tmp_path):
+    """Written by gmsh from a box with names, which end up the same as in its own format."""
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.SaveGroupsOfElements", 1)
+        gmsh.option.setNumber("Mesh.ElementOrder", order)
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1], name="body")
+        top = [tag for dim, tag in gmsh.model.getEntities(2) if gmsh.model.occ.getCenterOfMass(dim, tag)[2] > 0.9]
+        gmsh.model.addPhysicalGroup(2, top, name="top")
+        gmsh.model.mesh.generate(3)
+        for name in ("part.unv", "part.msh"):
+            gmsh.write(str(tmp_path / name))
+    finally:
+        gmsh.finalize()
+    own, other = build(tmp_path, "part.msh"), build(tmp_path, "part.unv")
+    assert other.cell_type == own.cell_type == ("tetra" if order == 1 else "tetra10")
+    assert volume(other) == pytest.approx(1.0, rel=1e-12)
+    assert len(other.regions["body"]) == len(own.regions["body"]) == len(own.cells)
+    assert other.surfaces.keys() == {"top"}
+    assert len(other.surfaces["top"]) == len(own.surfaces["top"]) > 2
+    assert (other.points[other.surfaces["top"], 2] == 1.0).all()
+    (tmp_path / "part.unv.opt").write_text('SystemCall "touch ran";\n')
+    with pytest.raises(MeshError, match=r"part.unv.opt:1: 'SystemCall' runs a program"):
+        build(tmp_path, "part.unv")
 
 
 def test_second_order_cells_survive_another_format(tmp_path):

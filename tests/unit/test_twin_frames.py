@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from fsci.case import Case, load_case
 from fsci.case.grid import GridSection
+from fsci.case.mesh import FileMesh
 from fsci.case.shapes import AnyShape
 from fsci.expression import Expression
 from fsci.meshes.mesh import MeshError, build_mesh
@@ -24,6 +25,7 @@ OTHERS = {
     ("Curve", "table"), ("Grid", "cells"), ("Grid", "from"), ("Grid", "to"), ("Output", "residuals"),
     ("PointSpring", "stiffness"), ("Free", "initial_angular_velocity"), ("FreeMotion", "initial_angular_velocity"),
     ("FreeBody", "initial_angular_velocity"), ("Rotation", "axis"), ("Turn", "axis"),
+    ("MeshSurface", "normal"),  # of the file: its mesh is placed as a whole
     ("Reference", "drag"), ("Reference", "lift"),
 }  # fmt: skip
 
@@ -42,6 +44,12 @@ def test_every_list_of_numbers_is_known():
             if (numbers or of_lists) and not placed and key not in OTHERS and name not in TURNING_VECTORS:
                 unknown.append(key)
     assert unknown == []
+
+
+def test_a_mesh_file_keeps_its_scale_and_surfaces():
+    surfaces = {"top": {"normal": (0.0, 1.0)}, "hole": {"box": ((0.0, 0.0), (1.0, 1.0))}}
+    given = {"file": "part.vtu", "scale": 0.001, "refine": 1, "surfaces": surfaces}
+    assert _Sections(MIRRORED, 2).mesh(FileMesh(**given)) == given | {"mirror": "x", "rotate": []}
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: frame.name)
