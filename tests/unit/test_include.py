@@ -9,8 +9,8 @@ from small_cases import PLATE
 
 from fsci.case.document import read_document
 from fsci.case.yaml_text import parse_yaml
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 from fsci.schema import json_schema
 
 #: PLATE in four files: a section with a setting beside `include`, a body, a list, and all of it.

@@ -12,8 +12,8 @@ from fsci import shapes
 from fsci.check.meshes import check_meshes
 from fsci.meshes.mesh import MeshError, build_mesh
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 from solvers.mesh.tessellation import is_closed, tessellate
 from solvers.mesh.topology import signed_volumes
 from solvers.rigid.inertia import inertia_of_surface
