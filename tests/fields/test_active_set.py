@@ -189,6 +189,16 @@ def test_sets_of_other_loads_are_no_cycle():
     assert active_set.changes == 40
 
 
+def test_a_residual_that_grows_counts_in_contact_only():
+    """Twice, in a body that contact acts on; one beside it that Newton finds hard needs no line search."""
+    structure, _, _ = press(SHAPES["ring"](), plane(2, -1.02))
+    assert structure.pieces.count == 1
+    here, elsewhere = np.array([True]), np.array([False])
+    assert structure.astray([here, elsewhere, here]) == "the residual grows"
+    assert structure.astray([here, elsewhere, elsewhere]) == ""
+    assert structure.astray() == ""
+
+
 def test_loads_between_iterates_forget_no_set():
     """A monolithic iteration sets a load in each iterate of its one solve; `solve` of the structure begins anew."""
     structure, contact, _ = press(SHAPES["ring"](), plane(2, -1.02))
