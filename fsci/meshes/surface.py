@@ -41,8 +41,7 @@ def cones(points: Array, triangles: Indices, numbers: Indices, surfaces: Mapping
     points: (n, 3) [m], equal ones become one node; triangles: (m, 3); numbers: of their facets in the file, from 1 on;
     surfaces: name -> triangles. Raises BadSurface with the place of a hole, or of a facet that faces the wrong way.
     """
-    # of the two zeros one would be another point
-    nodes, same = np.unique(points + 0.0, axis=0, return_inverse=True)
+    nodes, same = np.unique(points, axis=0, return_inverse=True)
     triangles = same.ravel()[triangles]
     kept = np.flatnonzero((triangles != np.roll(triangles, 1, axis=1)).all(axis=1))
     place = np.full(len(triangles), -1)

@@ -62,6 +62,8 @@ def test_names_are_those_of_the_shape(name, tmp_path):
     for times in (0, 1):
         found = build(tmp_path, file, rigid=True, scale=1e-3, refine=times, surfaces=surfaces, **placed)
         assert set(found.surfaces) == set(whole)
+        here = build(tmp_path, file, rigid=True, refine=times, surfaces={"up": surfaces["up"]})
+        assert (here.points[here.surfaces["up"]][..., -1] == 1.0).all()
         for key, size in whole.items():
             assert area(found, key) == pytest.approx(size * 1e-3 ** (dim - 1), rel=1e-9), key
 

@@ -84,6 +84,21 @@ def test_pieces_hollows_and_unused_points(tmp_path):
         assert mesh.note == note
 
 
+def test_both_zeros_are_one_point(tmp_path):
+    """STL has the corners of each facet: a cube at the origin, with minus zero in every other one of them."""
+    points, facets = facets_of(CUBE)
+    corners = points[facets]
+    corners[::2] = np.where(corners[::2] == 0.0, -0.0, corners[::2])
+    for binary in (False, True):
+        apart = np.arange(3 * len(facets)).reshape(-1, 3)
+        write(tmp_path / "zeros.stl", corners.reshape(-1, 3), ("triangle", apart), binary=binary)
+        write(tmp_path / "zeros.obj", corners.reshape(-1, 3), ("triangle", apart))
+        for name in ("zeros.stl", "zeros.obj"):
+            mesh = build_rigid(tmp_path, name)
+            assert len(mesh.points) == len(points) + 1
+            assert inertia(*facets_of(mesh)) == pytest.approx(inertia(points, facets), rel=1e-12, abs=1e-12)
+
+
 def test_named_groups_are_surfaces_and_facets_are_halved(tmp_path):
     points, facets = facets_of(CUBE)
     top = (points[facets][:, :, 2] == 1).all(axis=1)
