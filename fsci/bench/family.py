@@ -53,7 +53,7 @@ class FamilyScene:
     kept: dict[str, FamilyRun] = field(default_factory=dict)
 
     def run(self, settings: Settings | None = None) -> FamilyRun:
-        """Run it with some settings more; what has been run is not run again. Raises RunFailed."""
+        """Run it with some settings more; what has been run is not run again. Raises ProgramFailed."""
         from fsci.running.history import read_history
 
         together = {**self.settings, **(settings or {})}

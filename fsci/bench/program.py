@@ -12,7 +12,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 from typing import Any
 
 
-class RunFailed(RuntimeError):
+class ProgramFailed(RuntimeError):
     """A run that did not come to its end."""
 
 
@@ -24,7 +24,7 @@ def run_case(case: Path, out: Path, settings: Mapping[str, Any]) -> dict[str, An
 def run_timed(case: Path, out: Path, settings: Mapping[str, Any]) -> tuple[dict[str, Any], float]:
     """(summary.json, seconds of the processor) of a run that may miss its reference values.
 
-    Raises RunFailed if it does not come to its end.
+    Raises ProgramFailed if it does not come to its end.
     """
     arguments = [f"--set={name}={json.dumps(value)}" for name, value in settings.items()]
     command = [sys.executable, "-m", "fsci", "run", str(case), "-o", str(out), "--force", *arguments]
@@ -34,7 +34,7 @@ def run_timed(case: Path, out: Path, settings: Mapping[str, Any]) -> tuple[dict[
     seconds = _seconds() - begin
     summary = json.loads((out / "summary.json").read_text()) if (out / "summary.json").exists() else {}
     if done.returncode not in (0, 1) or summary.get("status") != "finished":
-        raise RunFailed(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+        raise ProgramFailed(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
     return summary, seconds
 
 

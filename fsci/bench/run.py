@@ -15,7 +15,7 @@ from fsci.bench.compare import compare
 from fsci.bench.family import Family, FamilyError, read_families
 from fsci.bench.front_plot import plot_front
 from fsci.bench.one_percent import table
-from fsci.bench.program import RunFailed
+from fsci.bench.program import ProgramFailed
 from fsci.bench.table import FRONT, Row, show
 from fsci.case.errors import did_you_mean
 from fsci.expression import ExpressionError
@@ -43,7 +43,7 @@ def run(names: Sequence[str], out: Path | None, against: Path | None, plots: Pat
         print(f"\n{family.name}: {family.words}", flush=True)
         try:
             rows = results[family.name] = family.run() if earlier is None else earlier
-        except (FamilyError, ExpressionError, RunFailed) as error:
+        except (FamilyError, ExpressionError, ProgramFailed) as error:
             raise BenchmarkError(f"{family.name}: {error}") from None
         words[family.name] = family.words
         print(show(rows), flush=True)

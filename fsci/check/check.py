@@ -17,8 +17,8 @@ from solvers.mesh.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
 
-COMPONENTS = ("x", "y", "z")
-LINE = 120  #: characters of a line of text, longer ones are divided
+VECTOR_PARTS = ("x", "y", "z")
+LINE_WIDTH = 120  #: characters of a line of text, longer ones are divided
 
 
 def summary(
@@ -60,7 +60,7 @@ def summary(
 
 def _wrapped(text: str, indent: int) -> str:
     """Lists of many names in lines below each other."""
-    lines = wrap(text, max(LINE - indent, LINE // 2), break_long_words=False, break_on_hyphens=False)
+    lines = wrap(text, max(LINE_WIDTH - indent, LINE_WIDTH // 2), break_long_words=False, break_on_hyphens=False)
     return ("\n" + " " * indent).join(lines)
 
 
@@ -76,9 +76,9 @@ def _columns(case: Case, pairs: bool) -> str:
     families: dict[str, list[str]] = {}
     for name in dict.fromkeys(columns):
         family, _, axis = name.rpartition(".")
-        families.setdefault(family if axis in COMPONENTS else name, []).append(axis)
+        families.setdefault(family if axis in VECTOR_PARTS else name, []).append(axis)
     return ", ".join(
-        " .".join([f"{name}.{axes[0]}", *axes[1:]]) if axes[0] in COMPONENTS else name
+        " .".join([f"{name}.{axes[0]}", *axes[1:]]) if axes[0] in VECTOR_PARTS else name
         for name, axes in families.items()
     )
 

@@ -30,7 +30,7 @@ SAFETY, SCATTER, TWIN = 1.3, 2.0, 1.25
 #: Orders between which values are taken to follow C h^p.
 LEAST_ORDER, MOST_ORDER = 0.8, 2.6
 #: Order that is assumed of values below that: displacements at the end of a crack have it.
-SLOWEST = 0.5
+SLOWEST_ORDER = 0.5
 
 #: Relative band that is good enough if nothing else is asked for: in it, another method may be outside of what levels
 #: say.
@@ -133,7 +133,7 @@ def estimate(known: Evidence) -> Estimate:
     words += tuple(_further_words(known, usable))
     verdict: Verdict = "resolved"
     no_phase = known.instant is not None and known.instant.late is None
-    if len(usable) < 3 or known.indicative or seen.assumed == SLOWEST or no_phase:
+    if len(usable) < 3 or known.indicative or seen.assumed == SLOWEST_ORDER or no_phase:
         verdict = "indicative"
     if band is None or levels_say is None or (outside and band > known.tolerance * known.scale):
         verdict = "not resolved"
@@ -178,7 +178,7 @@ def _order(usable: Sequence[LevelValue], rounding: float, scatter: float) -> _Se
     most = (far + SCATTER * scatter) / sure
     if most < _growth(sizes, LEAST_ORDER):
         words = f"finer levels change it hardly less than coarser ones: its order is below {LEAST_ORDER:g}"
-        return _Seen((words,), assumed=SLOWEST)
+        return _Seen((words,), assumed=SLOWEST_ORDER)
     if not _growth(sizes, LEAST_ORDER) <= far / near <= _growth(sizes, MOST_ORDER):
         return _Seen()
     order = _bisect(sizes, far / near)

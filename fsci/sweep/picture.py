@@ -9,7 +9,7 @@ from typing import Any
 from fsci.case import Case
 from fsci.plot.curves import label, literal
 from fsci.plot.lines import Line, plot_lines
-from fsci.sweep.points import Parameter, Point, short_names
+from fsci.sweep.points import Combination, Parameter, short_names
 
 SPREAD = 30.0  #: ratio of positive parameters from which their axis is logarithmic
 
@@ -18,7 +18,7 @@ def draw(
     out: Path,
     case: Case,
     several: Sequence[Parameter],
-    found: Sequence[Point],
+    found: Sequence[Combination],
     columns: Sequence[str],
     rows: Sequence[Mapping[str, Any]],
 ) -> Iterator[Path]:

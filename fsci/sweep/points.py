@@ -24,7 +24,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Point:
+class Combination:
     """One value for each parameter, and the name of the folder of its run."""
 
     name: str
@@ -71,15 +71,15 @@ def between_commas(text: str) -> Iterator[str]:
     yield part.strip()
 
 
-def points(several: Sequence[Parameter]) -> list[Point]:
+def points(several: Sequence[Parameter]) -> list[Combination]:
     """All combinations, the last parameter changing fastest; folders are called E=1e6,nu=0.3."""
     short = short_names([parameter.setting for parameter in several])
-    found: dict[str, Point] = {}
+    found: dict[str, Combination] = {}
     for number, values in enumerate(product(*(parameter.values for parameter in several)), 1):
         name = ",".join(f"{one}={_in_file_names(value)}" for one, value in zip(short, values, strict=True))
         if len(name) > LONGEST_NAME or name in found:
             name = f"run_{number}"
-        found[name] = Point(name, values)
+        found[name] = Combination(name, values)
     return list(found.values())
 
 

@@ -14,7 +14,7 @@ from fsci.running.files import write_text
 from fsci.running.summary import plain
 from fsci.running.warm import WarmProcess
 from fsci.sweep.picture import draw
-from fsci.sweep.points import Parameter, Point, parameters, points, short_names
+from fsci.sweep.points import Combination, Parameter, parameters, points, short_names
 from fsci.twin.changes import Twin
 from fsci.twin.compare import values
 from fsci.twin.runs import TwinEnded, known_runs, run_all
@@ -55,7 +55,7 @@ def sweep(path: Path, given: Sequence[tuple[str, str]], out: Path, say: Callable
 def _write(
     out: Path,
     several: Sequence[Parameter],
-    found: Sequence[Point],
+    found: Sequence[Combination],
     ended: Mapping[str, TwinEnded],
     known: Mapping[str, str],
 ) -> None:
@@ -73,7 +73,7 @@ def _write(
 
 
 def table(
-    several: Sequence[Parameter], found: Sequence[Point], ended: Mapping[str, TwinEnded]
+    several: Sequence[Parameter], found: Sequence[Combination], ended: Mapping[str, TwinEnded]
 ) -> tuple[list[str], list[dict[str, Any]]]:
     """Columns of values, and a row for each point: its folder, parameters, how its run stands, its time [s], values.
 

@@ -23,7 +23,6 @@ from solvers.algebra.gauss_seidel import TwoFields, matrix_of
 from solvers.algebra.petsc_python import PythonContext
 from solvers.api import Array, Indices
 
-
 #: Reduction of the residual of each column of X. ACCURACY
 COLUMN_REDUCTION = 1e-4
 

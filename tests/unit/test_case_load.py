@@ -217,5 +217,6 @@ def test_summary(case_of):
         "  time        0 to 2 s, 2 steps of 1\n"
         "  structure   static\n"
         "  body block  box, neo_hooke, 8 cells (order 2 hex)\n"
-        "  dofs        375"  # 5^3 nodes
+        "  dofs        375\n"  # 5^3 nodes
+        "  columns     structure.energy"
     )
