@@ -72,9 +72,9 @@ def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
     turn = (edges.argmin(axis=1)[:, None] + np.arange(1, 1 + dim)) % dim
     turned = np.take_along_axis(corners, turn[:, :, None], axis=1)
     places, facets, shares = [np.empty((0, dim))], [np.empty(0, dtype=np.int64)], [np.empty(0)]
-    for counts in np.unique(np.stack([along, across], axis=1), axis=0).tolist():
-        some = np.flatnonzero((along == counts[0]) & (across == counts[1]))
-        weights, share = _middles(*counts, dim)
+    for most, fewest in np.unique(np.stack([along, across], axis=1), axis=0).tolist():
+        some = np.flatnonzero((along == most) & (across == fewest))
+        weights, share = _middles(most, fewest, dim)
         places.append(np.einsum("wv,fvi->fwi", weights, turned[some]).reshape(-1, dim))
         facets.append(np.repeat(some, len(weights)))
         shares.append(np.tile(share, len(some)))
