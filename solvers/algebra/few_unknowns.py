@@ -23,8 +23,9 @@ from solvers.algebra.gauss_seidel import TwoFields, matrix_of
 from solvers.algebra.petsc_python import PythonContext
 from solvers.api import Array, Indices
 
-#: Reduction of the residual of each column of X. ACCURACY
-COLUMN_REDUCTION = 1e-4
+#: Reduction of the residual of each column of X. From 0.3 to 1e-5 two balls in a box take 50 or 51 iterations in 11
+#: steps, 195 without elimination. Where S is a twentieth of K, its error is below a fifth with this.
+COLUMN_REDUCTION = 1e-2
 
 #: Iterations for a column at most; X is then as good as it gets, and the outer method decides.
 COLUMN_ITERATIONS = 30

@@ -172,8 +172,8 @@ def choose_flow(
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
     sheets: there are several nodes in one place, which the coarse lattices of multigrid do not have; incomplete factors
     of second degree mostly stall there. smoothed: multigrid with stronger smoothers, which second degree always has.
-    with_solids: equations of elastic bodies may belong to the system. rough: single steps of smoothers diverge in steady flow,
-    as on stretched cells.
+    with_solids: equations of elastic bodies may belong to the system. rough: single steps of smoothers diverge in
+    steady flow, as on stretched cells.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)

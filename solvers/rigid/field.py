@@ -394,12 +394,9 @@ class RigidBodies:
             part[3:] = vector_rate(u[3:]) @ part[3:]
         self._last = added
         self.set_increments(self._u + added)
-        change, size = (np.linalg.norm(self._scaled(u), axis=1) for u in (added, self._u))
+        scale = np.where(np.arange(6) < 3, 1.0, self.extents[:, None])  # of rotations the size of the body [m]
+        change, size = (np.linalg.norm(scale * u, axis=1) for u in (added, self._u))
         return np.divide(change, size, out=np.zeros_like(size), where=size > 0.0)
-
-    def _scaled(self, u: Array) -> Array:
-        """Increments with rotations multiplied by the size of the body [m]."""
-        return np.where(np.arange(6) < 3, 1.0, self.extents[:, None]) * u
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""

@@ -130,6 +130,19 @@ def test_samples_in_flat_cells(flat):
         assert area is None or whole == pytest.approx(area)
 
 
+def test_long_thin_facets_have_few_samples():
+    """A tube of long triangles: samples are about a cell apart, in both directions, with the area of the facets."""
+    grid = uniform([-2, -2, -1], [2, 2, 9], [20, 20, 50])
+    facets, nodes = tessellate(mesh := shapes.tube(1.0, 1.5, 8.0, [48, 1, 1]))
+    corners = mesh.points[nodes][facets]
+    samples = samples_of(grid, corners)
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert np.bincount(samples.facet, samples.area) == pytest.approx(area)
+    assert len(samples.x) < 4 * area.sum() / 0.2**2
+    middles = [np.bincount(samples.facet, samples.area * x) / area for x in samples.x.T]
+    assert np.abs(np.array(middles).T - corners.mean(axis=1)).max() < 0.03
+
+
 def test_edges():
     """Polygons of circles have none up to 45 degrees of a corner, rectangles and boxes do."""
     assert not has_edges(corners_of(shapes.disc(1.0, [12, 1])))

@@ -286,6 +286,35 @@ def test_system_of_two_fields():
     assert np.abs(x.array - np.concatenate([y1, y2])).max() < 1e-12
 
 
+def test_few_unknowns_are_eliminated_exactly():
+    """With exact factors of the second field one application solves, where Gauss-Seidel leaves much."""
+    fields, whole = two_fields()
+    matrix = matrix_of(fields)
+    b, x = matrix.createVecs()
+    b.array[:] = np.arange(13.0)
+    left = []
+    for few in (None, np.arange(5)):
+        ksp = linear.coupled_solver(PETSc.COMM_SELF, tolerance=1e-12, few=few)
+        linear.solve(ksp, matrix, b, x)
+        assert np.abs(whole @ x.array - b.array).max() < 1e-10
+        ksp.getPC().apply(b, x)
+        left.append(np.abs(whole @ x.array - b.array).max())
+    assert left[0] > 0.1
+    assert left[1] < 1e-10
+
+
+def test_few_unknowns_without_a_solution_stop_the_solver():
+    """The complement of unknowns without any equation is singular."""
+    fields, _ = two_fields()
+    fields.blocks[0][0].zeroEntries()
+    fields.blocks[0][1].zeroEntries()
+    matrix = matrix_of(fields)
+    b, x = matrix.createVecs()
+    b.set(1.0)
+    with pytest.raises(linear.LinearSolveFailed):
+        linear.solve(linear.coupled_solver(PETSc.COMM_SELF, tolerance=1e-12, few=np.arange(5)), matrix, b, x)
+
+
 def test_singular_first_field_stops_the_solver():
     fields, _ = two_fields()
     fields.blocks[0][0].zeroEntries()
