@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 #: a light and a heavy ball, so that added mass counts
 SCENE = """\
