@@ -88,7 +88,7 @@ private:
   template <int N>
   cut::Table make(const cut::Lattice& lattice, bool keep) {
     cut::TableMaker<N> maker(lattice, points_.data(), closing_ / lattice.quantum, only_exact_,
-                             std::exchange(memory_, {}));
+                             std::exchange(memory_, {}), keep);
     cut::Table table = maker.make();
     if (keep) memory_ = maker.memory(table);
     return table;

@@ -28,6 +28,7 @@ struct Candidates {
 
   // Cells without facets.
   void add(const std::vector<int>& others) {
+    if (others.empty()) return;
     Candidates merged;
     std::set_union(cells.begin(), cells.end(), others.begin(), others.end(), std::back_inserter(merged.cells));
     for (const int cell : merged.cells) {
@@ -94,15 +95,15 @@ inline Candidates candidates(const Lattice& lattice, std::int64_t reach = 0) {
         for (at[0] = from[0]; at[0] <= to[0]; ++at[0]) {
           if (!one) {
             const auto low = lattice.low(at), high = lattice.high(at);
-            double middle = 0, reach = 0, error = 0;
+            double middle = 0, extent = 0, error = 0;
             for (int d = 0; d < 3; ++d) {
               const double inner = 0.5 * static_cast<double>(high[d] - low[d]), half = inner + static_cast<double>(reach);
               const double way = static_cast<double>(low[d] - lattice.vertices[v[0]][d]) + inner;
               middle += n[d] * way;
-              reach += std::abs(n[d]) * half;
+              extent += std::abs(n[d]) * half;
               error += size[d] * (std::abs(way) + half);
             }
-            if (std::abs(middle) > reach + doubt * error) continue;
+            if (std::abs(middle) > extent + doubt * error) continue;
           }
           pairs.push_back(static_cast<std::uint64_t>(lattice.number(at)) << 32 | static_cast<std::uint32_t>(facet));
         }

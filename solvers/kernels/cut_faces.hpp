@@ -184,7 +184,7 @@ private:
     }
     part.area = 0.5 * context_.twice_area(polygon)[axis_] / (size_[0] * size_[1]);
     for (const auto& segment : beside)
-      if (context_.side(polygon, segment.plane) == 1) part.beside.push_back(segment.facet);
+      if (bounds_.empty() || context_.side(polygon, segment.plane) == 1) part.beside.push_back(segment.facet);
     for (const int facet : covering_) {
       bool covered = true;
       for (int i = 0; i < 3 && covered; ++i) {

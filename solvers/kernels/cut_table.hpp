@@ -34,8 +34,9 @@ template <int N>
 class TableMaker {
 public:
   // closing: length in quanta, 0: none; old: of a table of the same grid, facets, points and choices
-  TableMaker(const Lattice& lattice, const double* points, double closing, bool only_exact, Memory old)
-    : lattice_(lattice), integrals_(points), only_exact_(only_exact), old_(std::move(old)),
+  TableMaker(const Lattice& lattice, const double* points, double closing, bool only_exact, Memory old,
+             bool keep)
+    : lattice_(lattice), integrals_(points), only_exact_(only_exact), keep_(keep), old_(std::move(old)),
       zones_(closing > 0 ? ZoneFinder(lattice, closing).find() : Zones{}),
       zones_of_(zones_by_cell(lattice, zones_, closing)), candidates_(candidates(lattice)) {
     candidates_.add(zones_of_.cells);
@@ -50,12 +51,12 @@ public:
     for (std::size_t body = 0; body < lattice_.of_body.size(); ++body) fill(static_cast<int>(body));
     number_regions();
     integrate_surface();
-    flux_ = table_.moments;
+    if (keep_) flux_ = table_.moments;
     link_faces();
     return std::move(table_);
   }
 
-  // After `make`, of what it made.
+  // After `make` with `keep`, of what it made.
   Memory memory(const Table& table) {
     Memory made;
     made.filled = true;
@@ -259,8 +260,7 @@ private:
     std::vector<int> order;
     std::array<double, size> no_flux{};
     for (std::size_t c = 0; c < cells_.size(); ++c) {
-      first_piece_.push_back(table_.piece_facet.size());
-      first_closed_.push_back(table_.closed_facet.size());
+      if (keep_) note_rows();
       if (kept_[c] >= 0 && !filled_[c] && old_.whole[kept_[c]]) {
         copy_rows(c);
         continue;
@@ -314,6 +314,10 @@ private:
       for (int k = 0; k < here.regions; ++k)
         integrals_.to_volume(table_.moments.data() + (first_region_[c] + k) * size);
     }
+    if (keep_) note_rows();
+  }
+
+  void note_rows() {
     first_piece_.push_back(table_.piece_facet.size());
     first_closed_.push_back(table_.closed_facet.size());
   }
@@ -468,7 +472,7 @@ private:
 
   const Lattice& lattice_;
   Integrals<N> integrals_;
-  bool only_exact_;
+  bool only_exact_, keep_;
   Memory old_;
   Zones zones_;
   Candidates zones_of_;             // zones of each cell
