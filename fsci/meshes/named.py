@@ -17,7 +17,7 @@ from solvers.mesh.topology import boundary_facets
 Array = NDArray[np.float64]
 
 #: How far outside of a box nodes may be, relative to the mesh's size: files have seven digits.
-ROUNDED = 1e-6
+ROUNDED_BOX = 1e-6
 
 
 def with_surfaces(mesh: Mesh, named: Mapping[str, Any]) -> Mesh:
@@ -41,7 +41,7 @@ def with_surfaces(mesh: Mesh, named: Mapping[str, Any]) -> Mesh:
             for end, corner in enumerate(section.box):
                 _require_entries(mesh, corner, name, "box", end)
             low, high = np.array(section.box, dtype=float)
-            rounded = ROUNDED * float(np.ptp(mesh.points, axis=0).max())
+            rounded = ROUNDED_BOX * float(np.ptp(mesh.points, axis=0).max())
             chosen &= ((x >= low - rounded) & (x <= high + rounded)).all(axis=(1, 2))
         if not chosen.any():
             raise MeshError(f"no facet of the boundary is there: {_nearest(x, section)}", "surfaces", name)

@@ -20,7 +20,7 @@ Indices = NDArray[np.int64]
 
 
 #: Facets of a part, evenly over it, that are looked for in other parts.
-MOST_TRIED = 200
+MOST_FACETS_SOUGHT = 200
 
 
 class BadSurface(ValueError):
@@ -166,7 +166,7 @@ def _require_apart(nodes: Array, triangles: Indices, parts: Indices, volumes: Ar
         near = ((low <= high[part]) & (high >= low[part])).all(axis=1)
         near[part] = False
         others, own = x[near[parts]], x[parts == part].mean(axis=1)
-        for middle in own[:: -(-len(own) // MOST_TRIED)]:
+        for middle in own[:: -(-len(own) // MOST_FACETS_SOUGHT)]:
             around = round(_solid_angle(others - middle) / (4.0 * np.pi))
             if around == (0 if volume > 0.0 else 1):
                 continue
