@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from coupling.composite import Composite
 from coupling.elastic import Elastic
 from coupling.ports import Solid
 from coupling.surface_loads import surface_loads
@@ -12,9 +11,15 @@ from solvers.fluid.flow.field import Fluid
 
 def loads_of_flow(solid: Solid, fluid: Fluid) -> dict[str, Array]:
     """Field -> values at owned dofs of the structure, see `surface_loads`; zero before the first step (collective)."""
-    elastic = solid.elastic if isinstance(solid, Composite) else solid
-    assert isinstance(elastic, Elastic)
+    elastic = solid if isinstance(solid, Elastic) else _of_both(solid)
     x = fluid.moving.surfaces.by_name(fluid.cut.motion.x)
     force = fluid.force() if fluid.started else {name: 0.0 * positions for name, positions in x.items()}
     facets = {body.surface.name: body.surface.facets for body in fluid.bodies}
     return surface_loads(elastic, force, x, facets)
+
+
+def _of_both(solid: Solid) -> Elastic:
+    from coupling.composite import Composite
+
+    assert isinstance(solid, Composite)
+    return solid.elastic
