@@ -81,6 +81,13 @@ def _parser() -> argparse.ArgumentParser:
                 help="take a results folder with other files in it; those in the way are renamed to NAME.old",
             )
 
+    preview = command(_preview, "draw a case before it is computed: bodies, grid, supports, loads, pairs, probes")
+    preview.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
+    settings(preview, "replace a setting")
+    preview.add_argument(
+        "-o", "--out", metavar="FILE", type=Path, default=Path("preview.png"), help="the picture (default: preview.png)"
+    )
+
     resume = command(_resume, "continue a run from its last checkpoint")
     results(resume)
     settings(
@@ -304,6 +311,19 @@ def _run(options: argparse.Namespace) -> int:
         return _fail(_with_notes(error)) if first else 2
     except (OSError, MemoryError, KeyboardInterrupt) as error:
         return _broken("run", error)
+
+
+def _preview(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.preview.preview import preview
+
+    try:
+        print("\n".join(preview(options.case, options.overrides, options.out)))
+    except CaseError as error:
+        return _fail(str(error))
+    except (OSError, RuntimeError) as error:
+        return _fail(f"fsci preview: {error}")
+    return 0
 
 
 def _resume(options: argparse.Namespace) -> int:

@@ -27,7 +27,7 @@ ENVIRONMENT = {
 PARALLEL = {**ENVIRONMENT, "OMPI_MCA_mpi_yield_when_idle": "1"}
 
 #: commands that get a process of their own: what draws may have threads here, which a copy would wait for
-DRAWING = ("plot", "report")
+DRAWING = ("plot", "report", "preview")
 
 
 def command(*arguments, processes: int = 1) -> list[str]:

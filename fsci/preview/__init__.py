@@ -1,0 +1,1 @@
+"""A case in one picture before it is computed: the command `fsci preview`."""

@@ -1,0 +1,222 @@
+"""The picture of a preview: in the plane as it stands, in space seen from above the front, with names beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, label, literal, save_figure
+from fsci.plot.render import axes_of_view, frame, import_pyvista, photograph
+from fsci.plot.scene import draw_triad
+from fsci.preview.parts import Pair, Part, Preview
+from solvers.api import Array
+
+WIDTH = 11.0  #: of the picture with its legend [inch]
+LEGEND = 3.4  #: of that for the legend [inch]
+HEIGHTS = (4.0, 9.0)  #: least and largest [inch]
+MANY_LINES = 400  #: of the grid along an axis, from which they are left out: they would cover everything
+MANY_NAMES = 15  #: bodies, from which the legend alone has their names
+MANY_ENTRIES = 40  #: of the legend
+FILLED = {"elastic": 0.55, "free": 0.55, "moved": 0.35, "rigid": 0.25, "obstacle": 0.25}  #: kind -> opacity
+MARKED = {"support": "black", "spring": "dimgray", "traction": "#d55e00", "pressure": "#cc79a7"}
+PATCHES = {"no slip": "black", "velocity": "#0072b2", "outflow": "#009e73", "periodic": "#e69f00"}
+OTHER_PATCH = "#56b4e9"
+NEAR = "#cc0000"  #: of the line between the surfaces of a pair
+
+Entry = tuple[Any, str]  #: colour, words
+
+
+def draw(path: Path, scene: Preview, units: Mapping[str, str]) -> None:
+    """Write the picture as PNG."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    corners = np.concatenate([part.corners.reshape(-1, part.corners.shape[2]) for part in scene.bodies + scene.patches])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if scene.box is not None:  # a body that reaches far out of the box would make all else small
+        margin = 0.15 * (scene.box[1] - scene.box[0])
+        low, high = np.maximum(low, scene.box[0] - margin), np.minimum(high, scene.box[1] + margin)
+    with matplotlib.rc_context({**CURVE_STYLE, "axes.grid": False, "font.size": 10}):
+        if len(low) == 2:
+            slope = float((high - low)[1] / max((high - low)[0], 1e-300))
+            figure = Figure((WIDTH, float(np.clip((WIDTH - LEGEND) * slope + 1.0, *HEIGHTS))), dpi=CURVE_DOTS)
+            axes = figure.add_axes((0.7 / WIDTH, 0.12, (WIDTH - LEGEND - 0.9) / WIDTH, 0.80))
+            _draw_plane(axes, scene, low, high, units)
+        else:
+            figure = Figure((WIDTH, 7.0), dpi=CURVE_DOTS)
+            _draw_space(figure, scene, low, high)
+        figure.suptitle(literal(scene.title), x=0.02, ha="left", y=0.985)
+        _add_legend(figure, scene, units["length"])
+        save_figure(figure, path)
+
+
+def colours_of(bodies: list[Part]) -> list[str]:
+    """One for each body; more bodies than colours share them."""
+    return [COLOURS[number % len(COLOURS)] for number in range(len(bodies))]
+
+
+def entries(scene: Preview, unit: str) -> Iterator[Entry]:
+    """The legend: what has which colour."""
+    for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
+        yield colour, f"{part.name} ({part.kind})"
+    for part in scene.marks:
+        yield MARKED[part.kind], f"{part.kind} on {part.name}"
+    for pair in scene.pairs:
+        yield NEAR, f"pair {words_of(pair, unit)}"
+    for part in scene.patches:
+        yield PATCHES.get(part.kind, OTHER_PATCH), f"patch {part.name} ({part.kind})"
+    for name in scene.probes:
+        yield "black", f"probe {name}"
+
+
+def closest(pairs: list[Pair]) -> list[Pair]:
+    """Of all pairs of the same two bodies the one that is least apart: lines of all of them would cover each other."""
+    found: dict[tuple[str, ...], Pair] = {}
+    for pair in pairs:
+        bodies = tuple(side.name.partition(".")[0] for side in pair.sides)
+        if bodies not in found or pair.distance < found[bodies].distance:
+            found[bodies] = pair
+    return list(found.values())
+
+
+def words_of(pair: Pair, unit: str) -> str:
+    """Its surfaces and how far they are apart."""
+    slave, master = pair.sides
+    return f"{pair.name}: {slave.name}, {master.name}, {pair.distance:.4g} {unit} apart"
+
+
+def _add_legend(figure: Any, scene: Preview, unit: str) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    found = list(entries(scene, unit))
+    if len(found) > MANY_ENTRIES:
+        found = [*found[: MANY_ENTRIES - 1], ("white", f"and {len(found) - MANY_ENTRIES + 1} more")]
+    handles: list[Any] = []
+    for colour, words in found:
+        text = literal(_short(words))
+        if words.startswith("probe"):
+            handles.append(Line2D([], [], color=colour, marker="+", linestyle="", label=text))
+        elif words.startswith("pair"):
+            handles.append(Line2D([], [], color=colour, marker=".", label=text))
+        else:
+            handles.append(Patch(color=colour, label=text))
+    place = {"loc": "upper left", "bbox_to_anchor": (1.0 - LEGEND / WIDTH, 0.94)}
+    figure.legend(handles=handles, fontsize=8 if len(handles) <= 25 else 6, **place)
+
+
+def _short(words: str) -> str:
+    return words if len(words) <= 54 else f"{words[:51]}..."
+
+
+# ------------------------------------------------------------------------------------------------------- the plane
+
+
+def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mapping[str, str]) -> None:
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.patches import PathPatch
+
+    for axis, planes in enumerate(scene.planes):
+        if len(planes) <= MANY_LINES and not scene.cells:
+            ends = scene.planes[1 - axis][[0, -1]]
+            lines = [[(p, e) if axis == 0 else (e, p) for e in ends] for p in planes]
+            axes.add_collection(LineCollection(lines, colors="0.85", linewidths=0.4, zorder=1))
+    if scene.cells:
+        boxes = [[(a, b), (c, b), (c, d), (a, d)] for (a, b), (c, d) in scene.cells]
+        axes.add_collection(PolyCollection(boxes, facecolors="none", edgecolors="0.8", linewidths=0.3, zorder=1))
+    for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
+        path = _filled(part.corners)
+        axes.add_patch(PathPatch(path, facecolor=colour, alpha=FILLED[part.kind], edgecolor="none", zorder=2))
+        axes.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=1.2, zorder=3))
+        if len(scene.bodies) < MANY_NAMES:
+            x, y = np.clip(part.middle, low, high)
+            axes.text(x, y, literal(part.name), ha="center", va="center", fontsize=9, zorder=8)
+    for part in scene.patches:
+        colour = PATCHES.get(part.kind, OTHER_PATCH)
+        axes.add_collection(LineCollection(list(part.corners), colors=colour, linewidths=3.0, zorder=4, clip_on=False))
+    for part in scene.marks:
+        axes.add_collection(LineCollection(list(part.corners), colors=MARKED[part.kind], linewidths=2.6, zorder=5))
+    for pair in closest(scene.pairs):
+        axes.add_collection(LineCollection([pair.ends], colors=NEAR, linewidths=1.2, zorder=6))
+        axes.plot(*pair.ends.T, ".", color=NEAR, markersize=4, zorder=6)
+    for point in scene.probes.values():
+        axes.plot(*point[:2], "+", color="black", markersize=9, zorder=7)
+    margin = 0.03 * (high - low).max()
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+    axes.set_xlabel(label("x", "displacement", units))
+    axes.set_ylabel(label("y", "displacement", units))
+
+
+def _filled(segments: Array) -> Any:
+    """The path around a body: closed loops of segments that run with the body on their left."""
+    from matplotlib.path import Path as Outline
+
+    starts = {tuple(start): number for number, start in enumerate(segments[:, 0])}
+    left, vertices, codes = set(range(len(segments))), [], []
+    while left:
+        number = next(iter(left))
+        codes.append(Outline.MOVETO)
+        vertices.append(segments[number, 0])
+        while number in left:
+            left.discard(number)
+            vertices.append(segments[number, 1])
+            codes.append(Outline.LINETO)
+            number = starts.get(tuple(segments[number, 1]), -1)
+        codes[-1] = Outline.CLOSEPOLY
+    return Outline(np.array(vertices), codes)
+
+
+# ----------------------------------------------------------------------------------------------------------- space
+
+
+def _draw_space(figure: Any, scene: Preview, low: Array, high: Array) -> None:
+    pyvista = import_pyvista()
+    place = (0.01, 0.03, (WIDTH - LEGEND - 0.1) / WIDTH, 0.90)
+    size = tuple(round(figure.get_size_inches()[i] * place[2 + i] * CURVE_DOTS) for i in (0, 1))
+    axes = axes_of_view(flat=False)
+    seen = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T @ axes
+    view = frame(axes, seen.min(axis=0), seen.max(axis=0), aspect=size[0] / size[1])
+    plotter = pyvista.Plotter(off_screen=True, window_size=[2 * length for length in size], lighting="light kit")
+    plotter.set_background("white")
+    for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
+        surface = _triangles(part.corners)
+        if scene.box is not None:
+            surface = surface.clip_box(np.column_stack([low, high]).ravel(), invert=False).extract_surface(
+                algorithm="dataset_surface"
+            )
+        if surface.n_points:
+            plotter.add_mesh(
+                surface, color=colour, opacity=1.0 if part.kind in ("elastic", "free") else 0.5, ambient=0.4
+            )
+    for part in scene.marks:
+        plotter.add_mesh(_triangles(part.corners), color=MARKED[part.kind], opacity=0.8, lighting=False)
+    for part in scene.patches:
+        plotter.add_mesh(
+            _triangles(part.corners), color=PATCHES.get(part.kind, OTHER_PATCH), opacity=0.08, lighting=False
+        )
+    for pair in closest(scene.pairs):
+        plotter.add_mesh(pyvista.Line(*pair.ends), color=NEAR, line_width=5)
+    if scene.box is not None:
+        plotter.add_mesh(pyvista.Box(np.column_stack(scene.box).ravel()).outline(), color="black", line_width=2)
+    if scene.probes:
+        plotter.add_mesh(pyvista.PolyData(np.array(list(scene.probes.values()))), color="black", point_size=14)
+    if len(scene.bodies) < MANY_NAMES:
+        named = np.array([np.clip(part.middle, low, high) for part in scene.bodies])
+        names = [part.name for part in scene.bodies]
+        looks = {"font_size": 40, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
+        plotter.add_point_labels(named, names, always_visible=True, show_points=False, **looks)
+    image = photograph(plotter, view, np.cross(view.right, view.up), size)
+    panel = figure.add_axes(place)
+    panel.imshow(image, aspect="auto")
+    panel.set_axis_off()
+    draw_triad(figure, view)
+
+
+def _triangles(corners: Array) -> Any:
+    cells = np.arange(3 * len(corners)).reshape(-1, 3)
+    return import_pyvista().PolyData(corners.reshape(-1, 3), np.column_stack([np.full(len(cells), 3), cells]).ravel())

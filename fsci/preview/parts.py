@@ -1,0 +1,173 @@
+"""What a preview shows of a case: bodies, grid, and where supports, loads, pairs, patches and probes are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fsci.case import Case, CaseError
+from fsci.case.contact import PairSection
+from fsci.check.meshes import check_meshes
+from fsci.meshes.nested import read_grid
+from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, read_rigid_side
+from solvers.api import Array
+from solvers.mesh.distance import nearest_points
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import area_vectors, tessellate
+
+NEAREST_FACETS = 8  #: by their middles, to which the distance of a corner is computed
+
+
+@dataclass(frozen=True)
+class Part:
+    """A surface with a name: segments or triangles with these corners, shape (n, dim, dim) [m]."""
+
+    name: str
+    kind: str  #: elastic, rigid, moved, free or obstacle; support, load, or the kind of a patch
+    corners: Array
+
+    @property
+    def middle(self) -> Array:
+        """The mean of its facets, by their sizes [m], shape (dim,)."""
+        sizes = np.linalg.norm(area_vectors(self.corners), axis=1)
+        weights = sizes if sizes.sum() > 0.0 else np.ones(len(sizes))
+        return np.asarray(np.average(self.corners.mean(axis=1), axis=0, weights=weights))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two surfaces in contact, and where they are nearest."""
+
+    name: str
+    sides: tuple[Part, Part]
+    ends: Array  #: the nearest points [m], shape (2, dim)
+
+    @property
+    def distance(self) -> float:
+        """[m]"""
+        return float(np.linalg.norm(self.ends[1] - self.ends[0]))
+
+
+@dataclass(frozen=True)
+class Preview:
+    """All that is drawn; positions in [m]."""
+
+    title: str
+    bodies: list[Part]
+    marks: list[Part]  #: supports and loads
+    patches: list[Part]
+    pairs: list[Pair]
+    probes: dict[str, Array]
+    box: tuple[Array, Array] | None = None
+    planes: tuple[Array, ...] = ()  #: of the grid, along each axis
+    cells: list[Array] = field(default_factory=list)  #: (low, high) corners of nested cells
+
+
+def preview_of(case: Case) -> Preview:
+    """Reads the meshes of a case. Raises CaseError with all that `fsci check` finds in them."""
+    found = check_meshes(case)
+    if found.problems:
+        raise CaseError(found.problems)
+    bodies = list(_bodies(case))
+    probes = {name: np.asarray(probe.at) for name, probe in case.probes.items() if probe.at is not None}
+    pairs = [pair for name, settings in found.pairs.items() if (pair := _pair(case, name, settings)) is not None]
+    if case.fluid is None:
+        return Preview(case.title, bodies, list(_marks(case)), [], pairs, probes)
+    section = case.fluid.grid
+    low, high = np.asarray(section.start, dtype=float), np.asarray(section.to, dtype=float)
+    patches = [
+        Part(name, patch.kind.replace("_", " "), np.concatenate([_face(low, high, face) for face in patch.on]))
+        for name, patch in case.fluid.patches.items()
+    ]
+    planes = tuple(np.asarray(edge) for edge in section.planes)
+    cells = list(_nested_cells(case)) if section.refine else []
+    return Preview(case.title, bodies, list(_marks(case)), patches, pairs, probes, (low, high), planes, cells)
+
+
+def _bodies(case: Case) -> Iterator[Part]:
+    for name in case.elastic_bodies:
+        yield _surface(read_body(case, name), None, name, "elastic")
+    given = {} if case.fluid is None else case.fluid.bodies
+    for name in case.rigid_surfaces:
+        _, points, facets = read_rigid_body(case, name)
+        moved = name in given and given[name].motion is not None
+        kind = "free" if name in (case.rigid or ()) else "moved" if moved else "rigid"
+        yield Part(name, kind, points[facets])
+    for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
+        if obstacle.free is None:
+            yield _surface(read_obstacle(case, name), None, name, "obstacle")
+
+
+def _surface(mesh: Mesh, names: Sequence[str] | None, name: str, kind: str) -> Part:
+    facets, nodes = tessellate(mesh, names)
+    return Part(name, kind, mesh.points[nodes][facets])
+
+
+def _marks(case: Case) -> Iterator[Part]:
+    """Surfaces of elastic bodies with supports, springs, tractions and pressures."""
+    kinds = {"supports": "support", "springs": "spring", "tractions": "traction", "pressures": "pressure"}
+    for name, body in case.elastic_bodies.items():
+        mesh = read_body(case, name)
+        for setting, kind in kinds.items():
+            for item in getattr(body, setting):
+                on = [surface for surface in item.on or () if surface in mesh.surfaces]
+                if on:
+                    yield _surface(mesh, on, f"{name}.{' + '.join(on)}", kind)
+
+
+def _pair(case: Case, name: str, settings: PairSection) -> Pair | None:
+    """None for a surface on itself."""
+    if settings.itself is not None:
+        return None
+    parts = []
+    for role, side in settings.sides:
+        if side.body in case.elastic_bodies:
+            mesh, on = read_body(case, side.body), side.on
+        else:
+            mesh, on = read_rigid_side(case, side.body or side.obstacle or "")
+        where = f"{side.body or side.obstacle}{'.' if on else ''}{' + '.join(on or ())}"
+        parts.append(_surface(mesh, on, where, role))
+    return Pair(name, (parts[0], parts[1]), nearest(parts[0].corners, parts[1].corners))
+
+
+def nearest(one: Array, other: Array) -> Array:
+    """The nearest points of two surfaces [m], shape (2, dim): one of both is a corner.
+
+    Edges of triangles that cross each other in space may be nearer.
+    """
+    best: tuple[float, Array] = (np.inf, np.zeros((2, one.shape[2])))
+    for first, (corners, facets) in enumerate(((one, other), (other, one))):
+        points = np.unique(corners.reshape(-1, corners.shape[2]), axis=0)
+        count = min(NEAREST_FACETS, len(facets))
+        middles = cKDTree(facets.mean(axis=1))
+        away, _ = middles.query(points)
+        size = float(np.linalg.norm(facets - facets.mean(axis=1)[:, None], axis=2).max())
+        close = points[away <= away.min() + 2.0 * size]
+        _, numbers = middles.query(close, k=count)
+        for point, candidates in zip(close, np.asarray(numbers).reshape(len(close), count), strict=True):
+            foot = nearest_points(point[None], facets[candidates])[0]
+            if (distance := float(np.linalg.norm(foot - point))) < best[0]:
+                best = distance, np.stack([point, foot][:: 1 - 2 * first])
+    return best[1]
+
+
+def _face(low: Array, high: Array, face: str) -> Array:
+    """A face of the box, such as x-, as segments or triangles."""
+    axis, dim = "xyz".index(face[0]), len(low)
+    place = low[axis] if face[1] == "-" else high[axis]
+    others = [i for i in range(dim) if i != axis]
+    counts = np.array(np.meshgrid(*([[0, 1]] * (dim - 1)), indexing="ij")).reshape(dim - 1, -1).T
+    corners = np.empty((len(counts), dim))
+    corners[:, axis] = place
+    corners[:, others] = low[others] + counts * (high - low)[others]
+    return corners[[[0, 1]]] if dim == 2 else corners[[[0, 1, 3], [0, 3, 2]]]
+
+
+def _nested_cells(case: Case) -> Iterator[Array]:
+    """Corners (low, high) of all cells of a grid with nested ones."""
+    mesh = read_grid(case).picture()  # type: ignore[attr-defined]
+    points = mesh.points[mesh.cells]
+    yield from np.stack([points.min(axis=1), points.max(axis=1)], axis=1)

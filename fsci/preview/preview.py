@@ -1,0 +1,19 @@
+"""The command `fsci preview`: draws a case that has not been computed, and says how far its pairs are apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fsci.case import load_case
+from fsci.preview.draw import draw, words_of
+from fsci.preview.parts import preview_of
+
+
+def preview(path: Path, overrides: Sequence[tuple[str, str]], out: Path) -> list[str]:
+    """Write the picture `out`; lines on pairs of contact, then the file. Raises CaseError, or OSError."""
+    case = load_case(path, overrides)
+    scene = preview_of(case)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    draw(out, scene, case.units.model_dump())
+    return [*(f"pair {words_of(pair, case.units.length)}" for pair in scene.pairs), str(out)]

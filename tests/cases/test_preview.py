@@ -1,0 +1,133 @@
+"""`fsci preview`: what is drawn, distances of pairs, pictures in the plane and in space, refused cases."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from programs import fsci
+
+from fsci.case import load_case
+from fsci.preview.draw import closest, entries
+from fsci.preview.parts import nearest, preview_of
+from solvers.mesh.distance import distances_in_pairs
+
+PLANE = """
+title: All kinds
+time: {step: 0.1, end: 1}
+structure:
+  bodies:
+    block:
+      mesh: {shape: ring, inner_radius: 0.1, outer_radius: 0.2, cells: [16, 2], translate: [0.5, 0.5]}
+      material: {law: neo_hooke, E: 100, nu: 0.3, density: 1}
+      supports: [{on: inner, displacement: [0, 0]}]
+  dynamics: {rho_inf: 0.8}
+fluid:
+  density: 1
+  viscosity: 1
+  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
+  patches:
+    inlet: {on: x-, velocity: ["y*(1-y)", 0]}
+    walls: {on: [y-, y+], no_slip: true}
+    outlet: {on: x+, outflow: true}
+  bodies:
+    still: {mesh: {shape: disc, radius: 0.1, cells: [16, 2], translate: [1, 0.5]}}
+    moved: {mesh: {shape: disc, radius: 0.1, cells: [16, 2], translate: [1.4, 0.5]}, motion: {velocity: [0.1, 0]}}
+    loose: {mesh: {shape: disc, radius: 0.1, cells: [16, 2], translate: [1.7, 0.3]}, free: {density: 2}}
+contact:
+  pairs: {stop: {slave: {body: block, on: outer}, master: {obstacle: still}}}
+coupling: {scheme: monolithic}
+probes:
+  force: {body: block, quantity: force}
+  here: {field: fluid, quantity: velocity, at: [1.9, 0.5]}
+"""
+
+SPACE = """
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    low:
+      mesh: {shape: box, size: [1, 1, 0.5], cells: [2, 2, 1]}
+      material: {law: neo_hooke, E: 100, nu: 0.3}
+      supports: [{on: bottom, displacement: [0, 0, 0]}]
+    high:
+      mesh: {shape: box, size: [0.4, 0.4, 0.5], origin: [0.25, 0.25, 0.52], cells: [2, 2, 1]}
+      material: {law: neo_hooke, E: 100, nu: 0.3}
+      supports: [{on: top, displacement: [0, 0, "-0.05*t"]}]
+      pressures: [{on: front, value: 1}]
+contact:
+  pairs: {blocks: {slave: {body: high, on: bottom}, master: {body: low, on: top}}}
+"""
+
+
+def written(folder, text):
+    (folder / "case.yaml").write_text(text)
+    return load_case(folder)
+
+
+def colours(path):
+    """Pixels that are not white, by rough colour."""
+    pixels = np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3)
+    return len(np.unique(pixels[pixels.min(axis=1) < 250] // 32, axis=0))
+
+
+def test_all_parts_of_a_scene_in_the_plane(tmp_path):
+    scene = preview_of(written(tmp_path, PLANE))
+    assert {part.name: part.kind for part in scene.bodies} == {
+        "block": "elastic", "still": "rigid", "moved": "moved", "loose": "free",
+    }  # fmt: skip
+    assert [(part.name, part.kind, len(part.corners)) for part in scene.marks] == [("block.inner", "support", 16)]
+    assert [(part.name, part.kind, len(part.corners)) for part in scene.patches] == [
+        ("inlet", "velocity", 1), ("walls", "no slip", 2), ("outlet", "outflow", 1),
+    ]  # fmt: skip
+    (pair,) = scene.pairs
+    assert [side.name for side in pair.sides] == ["block.outer", "still"]
+    assert pair.distance == pytest.approx(0.2)
+    assert pair.ends == pytest.approx(np.array([[0.7, 0.5], [0.9, 0.5]]))
+    assert scene.bodies[0].middle == pytest.approx([0.5, 0.5])
+    assert list(scene.probes) == ["here"]
+    words = [text for _, text in entries(scene, "m")]
+    assert "pair stop: block.outer, still, 0.2 m apart" in words
+    assert {"block (elastic)", "loose (free)", "support on block.inner", "patch inlet (velocity)"} <= set(words)
+
+
+@pytest.mark.parametrize(("text", "line"), [
+    (PLANE, "pair stop: block.outer, still, 0.2 m apart"),
+    (SPACE, "pair blocks: high.bottom, low.top, 0.02 m apart"),
+])  # fmt: skip
+def test_a_picture(tmp_path, text, line):
+    (tmp_path / "case.yaml").write_text(text)
+    ended = fsci("preview", tmp_path, "-o", tmp_path / "new" / "all.png")
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.splitlines() == [line, str(tmp_path / "new" / "all.png")]
+    assert colours(tmp_path / "new" / "all.png") > 20
+    assert {path.name for path in tmp_path.iterdir()} == {"case.yaml", "new"}
+
+
+def test_settings_and_mistakes(tmp_path):
+    (tmp_path / "case.yaml").write_text(SPACE)
+    ended = fsci("preview", tmp_path, "-o", tmp_path / "a.png", "--set", "structure.bodies.high.supports.0.on=tip")
+    assert ended.returncode == 2
+    assert "tip" in ended.stderr
+    assert not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_nearest_points_of_surfaces(dim):
+    """Those of all corners to all facets."""
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        one, other = (rng.random((n, 1, dim)) + 0.2 * rng.random((n, dim, dim)) for n in (40, 60))
+        other = other + np.array([1.3, *[0.0] * (dim - 1)])
+        exact = np.inf
+        for points, facets in ((one, other), (other, one)):
+            for point in points.reshape(-1, dim):
+                exact = min(exact, distances_in_pairs(np.tile(point, (len(facets), 1)), facets).min())
+        ends = nearest(one, other)
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(exact)
+        assert ends[0, 0] < ends[1, 0]
+
+
+def test_one_line_for_two_bodies(tmp_path):
+    """Of pairs of the same bodies the nearest one is drawn."""
+    more = "blocks: {slave: {body: high, on: bottom}, master: {body: low, on: top}}"
+    text = SPACE.replace(more, f"far: {{slave: {{body: high, on: top}}, master: {{body: low, on: top}}}}, {more}")
+    assert [pair.name for pair in closest(preview_of(written(tmp_path, text)).pairs)] == ["blocks"]
