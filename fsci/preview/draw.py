@@ -11,7 +11,7 @@ import numpy as np
 from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, label, literal, save_figure
 from fsci.plot.render import axes_of_view, frame, import_pyvista, photograph
 from fsci.plot.scene import draw_triad
-from fsci.preview.parts import Pair, Part, Preview
+from fsci.preview.parts import DistantPair, NamedSurface, Preview
 from solvers.api import Array
 
 WIDTH = 11.0  #: of the picture with its legend [inch]
@@ -21,7 +21,7 @@ MANY_LINES = 400  #: of the grid along an axis, from which they are left out: th
 MANY_NAMES = 15  #: bodies, from which the legend alone has their names
 MANY_ENTRIES = 40  #: of the legend
 FILLED = {"elastic": 0.55, "free": 0.55, "moved": 0.35, "rigid": 0.25, "obstacle": 0.25}  #: kind -> opacity
-MARKED = {"support": "black", "spring": "dimgray", "traction": "#d55e00", "pressure": "#cc79a7"}
+MARK_COLOURS = {"support": "black", "spring": "dimgray", "traction": "#d55e00", "pressure": "#cc79a7"}
 PATCHES = {"no slip": "black", "velocity": "#0072b2", "outflow": "#009e73", "periodic": "#e69f00"}
 OTHER_PATCH = "#56b4e9"
 NEAR = "#cc0000"  #: of the line between the surfaces of a pair
@@ -53,7 +53,7 @@ def draw(path: Path, scene: Preview, units: Mapping[str, str]) -> None:
         save_figure(figure, path)
 
 
-def colours_of(bodies: list[Part]) -> list[str]:
+def colours_of(bodies: list[NamedSurface]) -> list[str]:
     """One for each body; more bodies than colours share them."""
     return [COLOURS[number % len(COLOURS)] for number in range(len(bodies))]
 
@@ -63,7 +63,7 @@ def entries(scene: Preview, unit: str) -> Iterator[Entry]:
     for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
         yield colour, f"{part.name} ({part.kind})"
     for part in scene.marks:
-        yield MARKED[part.kind], f"{part.kind} on {part.name}"
+        yield MARK_COLOURS[part.kind], f"{part.kind} on {part.name}"
     for pair in scene.pairs:
         yield NEAR, f"pair {words_of(pair, unit)}"
     for part in scene.patches:
@@ -72,9 +72,9 @@ def entries(scene: Preview, unit: str) -> Iterator[Entry]:
         yield "black", f"probe {name}"
 
 
-def closest(pairs: list[Pair]) -> list[Pair]:
+def closest(pairs: list[DistantPair]) -> list[DistantPair]:
     """Of all pairs of the same two bodies the one that is least apart: lines of all of them would cover each other."""
-    found: dict[tuple[str, ...], Pair] = {}
+    found: dict[tuple[str, ...], DistantPair] = {}
     for pair in pairs:
         bodies = tuple(side.name.partition(".")[0] for side in pair.sides)
         if bodies not in found or pair.distance < found[bodies].distance:
@@ -82,7 +82,7 @@ def closest(pairs: list[Pair]) -> list[Pair]:
     return list(found.values())
 
 
-def words_of(pair: Pair, unit: str) -> str:
+def words_of(pair: DistantPair, unit: str) -> str:
     """Its surfaces and how far they are apart."""
     slave, master = pair.sides
     return f"{pair.name}: {slave.name}, {master.name}, {pair.distance:.4g} {unit} apart"
@@ -138,7 +138,9 @@ def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mappi
         colour = PATCHES.get(part.kind, OTHER_PATCH)
         axes.add_collection(LineCollection(list(part.corners), colors=colour, linewidths=3.0, zorder=4, clip_on=False))
     for part in scene.marks:
-        axes.add_collection(LineCollection(list(part.corners), colors=MARKED[part.kind], linewidths=2.6, zorder=5))
+        axes.add_collection(
+            LineCollection(list(part.corners), colors=MARK_COLOURS[part.kind], linewidths=2.6, zorder=5)
+        )
     for pair in closest(scene.pairs):
         axes.add_collection(LineCollection([pair.ends], colors=NEAR, linewidths=1.2, zorder=6))
         axes.plot(*pair.ends.T, ".", color=NEAR, markersize=4, zorder=6)
@@ -194,7 +196,7 @@ def _draw_space(figure: Any, scene: Preview, low: Array, high: Array) -> None:
                 surface, color=colour, opacity=1.0 if part.kind in ("elastic", "free") else 0.5, ambient=0.4
             )
     for part in scene.marks:
-        plotter.add_mesh(_triangles(part.corners), color=MARKED[part.kind], opacity=0.8, lighting=False)
+        plotter.add_mesh(_triangles(part.corners), color=MARK_COLOURS[part.kind], opacity=0.8, lighting=False)
     for part in scene.patches:
         plotter.add_mesh(
             _triangles(part.corners), color=PATCHES.get(part.kind, OTHER_PATCH), opacity=0.08, lighting=False

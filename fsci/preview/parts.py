@@ -18,11 +18,11 @@ from solvers.mesh.distance import nearest_points
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.tessellation import area_vectors, tessellate
 
-NEAREST_FACETS = 8  #: by their middles, to which the distance of a corner is computed
+FACETS_TRIED = 8  #: by their middles, to which the distance of a corner is computed
 
 
 @dataclass(frozen=True)
-class Part:
+class NamedSurface:
     """A surface with a name: segments or triangles with these corners, shape (n, dim, dim) [m]."""
 
     name: str
@@ -38,11 +38,11 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Pair:
+class DistantPair:
     """Two surfaces in contact, and where they are nearest."""
 
     name: str
-    sides: tuple[Part, Part]
+    sides: tuple[NamedSurface, NamedSurface]
     ends: Array  #: the nearest points [m], shape (2, dim)
 
     @property
@@ -56,10 +56,10 @@ class Preview:
     """All that is drawn; positions in [m]."""
 
     title: str
-    bodies: list[Part]
-    marks: list[Part]  #: supports and loads
-    patches: list[Part]
-    pairs: list[Pair]
+    bodies: list[NamedSurface]
+    marks: list[NamedSurface]  #: supports and loads
+    patches: list[NamedSurface]
+    pairs: list[DistantPair]
     probes: dict[str, Array]
     box: tuple[Array, Array] | None = None
     planes: tuple[Array, ...] = ()  #: of the grid, along each axis
@@ -79,7 +79,7 @@ def preview_of(case: Case) -> Preview:
     section = case.fluid.grid
     low, high = np.asarray(section.start, dtype=float), np.asarray(section.to, dtype=float)
     patches = [
-        Part(name, patch.kind.replace("_", " "), np.concatenate([_face(low, high, face) for face in patch.on]))
+        NamedSurface(name, patch.kind.replace("_", " "), np.concatenate([_face(low, high, face) for face in patch.on]))
         for name, patch in case.fluid.patches.items()
     ]
     planes = tuple(np.asarray(edge) for edge in section.planes)
@@ -87,7 +87,7 @@ def preview_of(case: Case) -> Preview:
     return Preview(case.title, bodies, list(_marks(case)), patches, pairs, probes, (low, high), planes, cells)
 
 
-def _bodies(case: Case) -> Iterator[Part]:
+def _bodies(case: Case) -> Iterator[NamedSurface]:
     for name in case.elastic_bodies:
         yield _surface(read_body(case, name), None, name, "elastic")
     given = {} if case.fluid is None else case.fluid.bodies
@@ -95,18 +95,18 @@ def _bodies(case: Case) -> Iterator[Part]:
         _, points, facets = read_rigid_body(case, name)
         moved = name in given and given[name].motion is not None
         kind = "free" if name in (case.rigid or ()) else "moved" if moved else "rigid"
-        yield Part(name, kind, points[facets])
+        yield NamedSurface(name, kind, points[facets])
     for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
         if obstacle.free is None:
             yield _surface(read_obstacle(case, name), None, name, "obstacle")
 
 
-def _surface(mesh: Mesh, names: Sequence[str] | None, name: str, kind: str) -> Part:
+def _surface(mesh: Mesh, names: Sequence[str] | None, name: str, kind: str) -> NamedSurface:
     facets, nodes = tessellate(mesh, names)
-    return Part(name, kind, mesh.points[nodes][facets])
+    return NamedSurface(name, kind, mesh.points[nodes][facets])
 
 
-def _marks(case: Case) -> Iterator[Part]:
+def _marks(case: Case) -> Iterator[NamedSurface]:
     """Surfaces of elastic bodies with supports, springs, tractions and pressures."""
     kinds = {"supports": "support", "springs": "spring", "tractions": "traction", "pressures": "pressure"}
     for name, body in case.elastic_bodies.items():
@@ -118,7 +118,7 @@ def _marks(case: Case) -> Iterator[Part]:
                     yield _surface(mesh, on, f"{name}.{' + '.join(on)}", kind)
 
 
-def _pair(case: Case, name: str, settings: PairSection) -> Pair | None:
+def _pair(case: Case, name: str, settings: PairSection) -> DistantPair | None:
     """None for a surface on itself."""
     if settings.itself is not None:
         return None
@@ -130,7 +130,7 @@ def _pair(case: Case, name: str, settings: PairSection) -> Pair | None:
             mesh, on = read_rigid_side(case, side.body or side.obstacle or "")
         where = f"{side.body or side.obstacle}{'.' if on else ''}{' + '.join(on or ())}"
         parts.append(_surface(mesh, on, where, role))
-    return Pair(name, (parts[0], parts[1]), nearest(parts[0].corners, parts[1].corners))
+    return DistantPair(name, (parts[0], parts[1]), nearest(parts[0].corners, parts[1].corners))
 
 
 def nearest(one: Array, other: Array) -> Array:
@@ -141,7 +141,7 @@ def nearest(one: Array, other: Array) -> Array:
     best: tuple[float, Array] = (np.inf, np.zeros((2, one.shape[2])))
     for first, (corners, facets) in enumerate(((one, other), (other, one))):
         points = np.unique(corners.reshape(-1, corners.shape[2]), axis=0)
-        count = min(NEAREST_FACETS, len(facets))
+        count = min(FACETS_TRIED, len(facets))
         middles = cKDTree(facets.mean(axis=1))
         away, _ = middles.query(points)
         size = float(np.linalg.norm(facets - facets.mean(axis=1)[:, None], axis=2).max())
