@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from fsci.argument_types import count, duration, override, share
+
 DESCRIPTION = "Fluid-structure-contact interaction from one YAML case file."
 EPILOG = """\
 first steps:
@@ -49,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
 
     def settings(one: argparse.ArgumentParser, words: str) -> None:
         one.add_argument(
-            "--set", dest="overrides", metavar="NAME=VALUE", action="append", default=[], type=_override, help=words
+            "--set", dest="overrides", metavar="NAME=VALUE", action="append", default=[], type=override, help=words
         )
 
     def results(one: argparse.ArgumentParser) -> None:
@@ -160,11 +162,11 @@ def _parser() -> argparse.ArgumentParser:
     converge.add_argument(
         "--tolerance",
         metavar="SHARE",
-        type=_share,
+        type=share,
         help="go to finer levels until all errors are smaller, and write the cheapest case for it: --tolerance 2%%",
     )
     converge.add_argument(
-        "--budget", metavar="TIME", type=_duration, help="leave out runs that would not end within it: --budget 20min"
+        "--budget", metavar="TIME", type=duration, help="leave out runs that would not end within it: --budget 20min"
     )
 
     sweep = command(_sweep, "run a case with several values of settings, and compare what comes out")
@@ -197,57 +199,21 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--plot", metavar="FOLDER", type=Path, help="draw error against time, unknowns and memory")
 
     stress = command(_stress, "run random hard cases, each against its twin, and count wrong results")
-    stress.add_argument("draws", metavar="N", type=_count, nargs="?", default=20, help="number of cases (default: 20)")
-    stress.add_argument("--seed", metavar="S", type=_count, default=0, help="seed of the first case (default: 0)")
+    stress.add_argument("draws", metavar="N", type=count, nargs="?", default=20, help="number of cases (default: 20)")
+    stress.add_argument("--seed", metavar="S", type=count, default=0, help="seed of the first case (default: 0)")
     stress.add_argument("-o", "--out", metavar="FILE", type=Path, help="write all results as JSON")
     stress.add_argument("--scenes", metavar="FILE", type=Path, help="draw from scenes of your own, a YAML file")
     stress.add_argument("--keep", metavar="FOLDER", type=Path, help="keep the cases with wrong results")
     stress.add_argument(
         "--steps",
         metavar="STEPS",
-        type=_count,
+        type=count,
         help="instead: number of steps of one case, to see whether results drift",
     )
 
     schema = command(_schema, "print the JSON schema of case files, for editors")
     schema.add_argument("--markdown", action="store_true", help="print the input reference instead")
     return parser
-
-
-def _override(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not name or not equals:
-        raise argparse.ArgumentTypeError(f"write NAME=VALUE, not '{text}'")
-    return name, value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"write a whole number, not '{text}'")
-    return int(text)
-
-
-def _share(text: str) -> float:
-    number, percent, _ = text.partition("%")
-    try:
-        share = float(number) / (100.0 if percent else 1.0)
-    except ValueError:
-        share = 0.0
-    if not 0.0 < share < 1.0:
-        raise argparse.ArgumentTypeError(f"write a share between 0 and 1 such as 0.02 or 2%, not '{text}'")
-    return share
-
-
-def _duration(text: str) -> float:
-    units = {"min": 60.0, "h": 3600.0, "s": 1.0}
-    unit = next((name for name in units if text.endswith(name)), "")
-    try:
-        seconds = float(text.removesuffix(unit)) * units.get(unit, 1.0)
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds < float("inf"):
-        raise argparse.ArgumentTypeError(f"write a time such as 30s, 20min or 2h, not '{text}'")
-    return seconds
 
 
 def _version() -> str:
