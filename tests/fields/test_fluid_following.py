@@ -64,10 +64,11 @@ def test_a_linear_flow_does_not_notice(element, scheme):
         around(coarsest, points), [wall(velocity)], [disc], dt=0.04, mu=0.1, element=element, scheme=scheme,
         following=Following(coarsest, [], [RefinedBody("disc", 5, 1)]), initial_velocity=velocity,
     )  # fmt: skip
-    grids, force = set(), Forces(fluid).probe("force", "disc", None)
+    grids, force = [fluid.grid], Forces(fluid).probe("force", "disc", None)
     for n in range(15):
         step(fluid, 0.04 * n, 0.04)
-        grids.add(id(fluid.grid))
+        if fluid.grid is not grids[-1]:  # all are kept: a new one may stand where one that is gone was
+            grids.append(fluid.grid)
         assert max(nodal_errors(fluid, velocity, lambda x, t: 0.0 * x[0], 0.0, level=True)) < 1e-10
     assert len(grids) > 3
     assert np.abs(list(force().values())).max() < 1e-10
