@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from coupling.elastic import Elastic
 from solvers.api import Array
-from solvers.mesh.tessellation import area_vectors, tangential
+from solvers.mesh.tessellation import tangential, vertex_shares
 
 
 def surface_loads(
@@ -22,20 +22,10 @@ def surface_loads(
     (n, dim), and their segments or triangles.
     """
     names: Sequence[str] = list(elastic.surfaces)
-    area, normal = zip(*(_shares(x[name], facets[name]) for name in names), strict=True)
-    at_nodes = [elastic.spread(np.concatenate(values)) for values in ([force[name] for name in names], area, normal)]
     dim = elastic.dofs.shape[1]
+    areas, normals = zip(*(vertex_shares(x[name], facets[name]) for name in names), strict=True)
+    shares = [np.tile(area[:, None], dim) for area in areas]  # in all components
+    at_nodes = [elastic.spread(np.concatenate(some)) for some in ([force[name] for name in names], shares, normals)]
     load, share, direction = (values.reshape(-1, dim) for values in at_nodes)
     traction = np.divide(load, share, out=np.zeros_like(load), where=share > 0.0)
     return {"traction": traction.ravel(), "wall_shear_stress": tangential(traction, direction).ravel()}
-
-
-def _shares(x: Array, facets: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Area [m^2] (length in 2D) of each vertex, in all components, and its area vector, both of shape (n, dim)."""
-    dim, vectors = x.shape[1], area_vectors(x[facets])
-    sizes = np.linalg.norm(vectors, axis=1)
-    area, normal = np.zeros_like(x), np.zeros_like(x)
-    for corner in facets.T:
-        np.add.at(area, corner, sizes[:, None] / dim)
-        np.add.at(normal, corner, vectors / dim)
-    return area, normal

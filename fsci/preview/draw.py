@@ -26,7 +26,7 @@ PATCHES = {"no slip": "black", "velocity": "#0072b2", "outflow": "#009e73", "per
 OTHER_PATCH = "#56b4e9"
 NEAR = "#cc0000"  #: of the line between the surfaces of a pair
 
-Entry = tuple[Any, str]  #: colour, words
+Entry = tuple[Any, str, str]  #: colour, words, marker of a point or line; empty: a surface
 
 
 def draw(path: Path, scene: Preview, units: Mapping[str, str]) -> None:
@@ -61,15 +61,15 @@ def colours_of(bodies: list[NamedSurface]) -> list[str]:
 def entries(scene: Preview, unit: str) -> Iterator[Entry]:
     """The legend: what has which colour."""
     for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
-        yield colour, f"{part.name} ({part.kind})"
+        yield colour, f"{part.name} ({part.kind})", ""
     for part in scene.marks:
-        yield MARK_COLOURS[part.kind], f"{part.kind} on {part.name}"
+        yield MARK_COLOURS[part.kind], f"{part.kind} on {part.name}", ""
     for pair in scene.pairs:
-        yield NEAR, f"pair {words_of(pair, unit)}"
+        yield NEAR, f"pair {words_of(pair, unit)}", "."
     for part in scene.patches:
-        yield PATCHES.get(part.kind, OTHER_PATCH), f"patch {part.name} ({part.kind})"
+        yield PATCHES.get(part.kind, OTHER_PATCH), f"patch {part.name} ({part.kind})", ""
     for name in scene.probes:
-        yield "black", f"probe {name}"
+        yield "black", f"probe {name}", "+"
 
 
 def closest(pairs: list[DistantPair]) -> list[DistantPair]:
@@ -94,14 +94,13 @@ def _add_legend(figure: Any, scene: Preview, unit: str) -> None:
 
     found = list(entries(scene, unit))
     if len(found) > MANY_ENTRIES:
-        found = [*found[: MANY_ENTRIES - 1], ("white", f"and {len(found) - MANY_ENTRIES + 1} more")]
+        found = [*found[: MANY_ENTRIES - 1], ("white", f"and {len(found) - MANY_ENTRIES + 1} more", "")]
     handles: list[Any] = []
-    for colour, words in found:
+    for colour, words, marker in found:
         text = literal(_short(words))
-        if words.startswith("probe"):
-            handles.append(Line2D([], [], color=colour, marker="+", linestyle="", label=text))
-        elif words.startswith("pair"):
-            handles.append(Line2D([], [], color=colour, marker=".", label=text))
+        if marker:
+            looks: Any = {"color": colour, "marker": marker, "linestyle": "-" if marker == "." else ""}
+            handles.append(Line2D([], [], label=text, **looks))
         else:
             handles.append(Patch(color=colour, label=text))
     place = {"loc": "upper left", "bbox_to_anchor": (1.0 - LEGEND / WIDTH, 0.94)}

@@ -65,10 +65,10 @@ def mean_gaps(contact: Contact, pair: int) -> Array:
     return contact.interface.at_nodes(contact.pairs[pair].slave, contact.mean_gap(), np.fmin)
 
 
-Of = Literal["contact_area", "stick_area", "mean_pressure"]
+AreaQuantity = Literal["contact_area", "stick_area", "mean_pressure"]
 
 
-def of_area(contact: Contact, pair: int, quantity: Of) -> Probe:
+def of_area(contact: Contact, pair: int, quantity: AreaQuantity) -> Probe:
     """Probe of the area [m^2] (length in 2D) in which a pair touches or sticks, or the mean pressure [Pa] in contact.
 
     Each slave node has the area int Phi_j over what the master covers, so that mean pressure times area is the normal

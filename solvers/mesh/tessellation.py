@@ -68,3 +68,14 @@ def tangential(vectors: Array, normals: Array) -> Array:
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     unit = np.divide(normals, size, out=np.zeros_like(normals), where=size > 0.0)
     return vectors - np.einsum("nd,nd->n", vectors, unit)[:, None] * unit
+
+
+def vertex_shares(x: Array, facets: Indices) -> tuple[Array, Array]:
+    """(area [m^2] (length in 2D), shape (n,); area vector, shape (n, dim)) of vertices: int N_b ds, int N_b n ds.
+
+    facets: segments or triangles with their corners at x [m], shape (n, dim).
+    """
+    dim, vectors = x.shape[1], area_vectors(x[facets])
+    parts = np.column_stack([np.linalg.norm(vectors, axis=1), vectors]).repeat(dim, axis=0) / dim
+    area, *normal = (np.bincount(facets.ravel(), weights=part, minlength=len(x)) for part in parts.T)
+    return np.asarray(area), np.stack(normal, axis=1)

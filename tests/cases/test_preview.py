@@ -84,7 +84,7 @@ def test_all_parts_of_a_scene_in_the_plane(tmp_path):
     assert pair.ends == pytest.approx(np.array([[0.7, 0.5], [0.9, 0.5]]))
     assert scene.bodies[0].middle == pytest.approx([0.5, 0.5])
     assert list(scene.probes) == ["here"]
-    words = [text for _, text in entries(scene, "m")]
+    words = [text for _, text, _ in entries(scene, "m")]
     assert "pair stop: block.outer, still, 0.2 m apart" in words
     assert {"block (elastic)", "loose (free)", "support on block.inner", "patch inlet (velocity)"} <= set(words)
 

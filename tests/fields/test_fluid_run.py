@@ -18,10 +18,9 @@ from fsci.plot.scene import UPRIGHT
 from fsci.running.history import read_history
 from fsci.running.output import read_collection
 from fsci.running.run import FINISHED, run_case
-from solvers.fluid.flow.snapshot import vertex_areas
 from solvers.fluid.surfaces.inside import winding
 from solvers.fluid.surfaces.surface import Motion
-from solvers.mesh.tessellation import is_closed, tessellate, unit_normals
+from solvers.mesh.tessellation import is_closed, tessellate, unit_normals, vertex_shares
 
 MOVING = """\
 title: a paddle turns and sways beside a ball
@@ -156,7 +155,7 @@ def test_files_of_a_flow(moving):
     surface = pyvista.read(paddle[-1][1])
     shift = 0.2 * np.sin(2 * np.pi * 0.12)
     assert np.allclose(surface.points.mean(axis=0), [1 + shift, 0.5, 0], atol=1e-6)
-    area = vertex_areas(surface.points[:, :2].astype(float), surface.cells.reshape(-1, 3)[:, 1:])
+    area, _ = vertex_shares(surface.points[:, :2].astype(float), surface.cells.reshape(-1, 3)[:, 1:])
     force = area @ surface.point_data["traction"]
     assert force[0] == pytest.approx(history["paddle.x"][-1], rel=1e-5)
     summary = json.loads((out / "summary.json").read_text())

@@ -7,7 +7,7 @@ import numpy as np
 from solvers.api import Array, Snapshot
 from solvers.fluid.flow.field import Fluid
 from solvers.mesh.distributed import Nodal, gather_nodal
-from solvers.mesh.tessellation import area_vectors, tangential
+from solvers.mesh.tessellation import tangential, vertex_shares
 
 
 def snapshots(fluid: Fluid) -> list[Snapshot]:
@@ -71,23 +71,14 @@ def _bodies(fluid: Fluid) -> list[Snapshot]:
             continue
         x, v = fluid.cut.motion.x[part], fluid.cut.motion.v[part]
         force = forces.get(surface.name, np.zeros_like(x))
-        area = vertex_areas(x, surface.facets)[:, None]
-        traction = np.divide(force, area, out=np.zeros_like(force), where=area > 0.0)
-        normals = np.zeros_like(x)
-        for corner in surface.facets.T:
-            np.add.at(normals, corner, area_vectors(x[surface.facets]))
+        area, normals = vertex_shares(x, surface.facets)
+        traction = np.divide(force, area[:, None], out=np.zeros_like(force), where=area[:, None] > 0.0)
         shear = tangential(traction, normals)
         fields = {"velocity": v, "traction": traction, "wall_shear_stress": shear}
         fields = {name: _in_space(values) for name, values in fields.items()}
         kind = "line" if dim == 2 else "triangle"
         found.append(Snapshot(surface.name, _in_space(x), surface.facets, kind, fields))
     return found
-
-
-def vertex_areas(x: Array, facets: np.ndarray) -> Array:
-    """Share of each vertex in the area [m^2] (length in 2D) of segments or triangles: int N_b ds, shape (n,)."""
-    dim, size = x.shape[1], np.linalg.norm(area_vectors(x[facets]), axis=1)
-    return np.asarray(np.bincount(facets.ravel(), weights=np.repeat(size / dim, dim), minlength=len(x)), dtype=float)
 
 
 def _in_space(vectors: Array) -> Array:
