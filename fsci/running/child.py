@@ -6,7 +6,7 @@ import os
 import sys
 
 #: One thread per process; Open MPI as root, on shared cores.
-_VARIABLES = {
+ON_SHARED_CORES = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
@@ -17,7 +17,7 @@ _VARIABLES = {
 
 def environment() -> dict[str, str]:
     """Its variables: those of this process, and those of a program on shared cores."""
-    return os.environ | _VARIABLES
+    return os.environ | ON_SHARED_CORES
 
 
 def command(*arguments: str, processes: int = 1) -> list[str]:
