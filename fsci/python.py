@@ -85,12 +85,12 @@ class Steps:
         return {snapshot.name: snapshot for snapshot in self._simulation.snapshots()}
 
 
-def load(case: str | Path, settings: Mapping[str, Any] | None = None) -> Case:
+def load(case: str | Path, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> Case:
     """Read a case from its file or folder; `settings` are dotted names with values in place of those in the file.
 
-    Raises CaseError with all mistakes.
+    With `trust` code of files that the case names may run. Raises CaseError with all mistakes.
     """
-    return load_case(case, [(name, _yaml(value)) for name, value in (settings or {}).items()])
+    return load_case(case, [(name, _yaml(value)) for name, value in (settings or {}).items()], trust=trust)
 
 
 def build(case: Case, comm: Any = None) -> Steps:

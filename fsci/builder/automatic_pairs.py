@@ -21,11 +21,11 @@ from fsci.builder.facing import Face, face, faces, meeting
 from fsci.builder.on_first import shared
 from fsci.case import Case
 from fsci.case.contact import Friction, PairSection, Side
-from fsci.case.material import Material
+from fsci.case.material import OwnLawSection
 from fsci.case.supports import SupportSection
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from solvers.mesh.mesh import Mesh
-from solvers.structure.elastic_constants import young
+from solvers.structure.elastic_constants import lambda_of_bulk, young
 from solvers.values import combine, evaluate
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def _body(case: Case, name: str, mesh: Mesh) -> Candidate:
     settings = case.elastic_bodies[name]
     held = [support for support in settings.supports if support.on is not None]
     free = [face for face in faces(mesh) if not any(holds(support, face) for support in held)]
-    return Candidate({"body": name}, free, mean_stiffness(settings.material, mesh))
+    return Candidate({"body": name}, free, mean_stiffness(case, name, mesh))
 
 
 def _obstacle(case: Case, name: str) -> Candidate:
@@ -176,7 +176,13 @@ def holds(support: SupportSection, face: Face) -> bool:
     return bool(share.min() > 0.5)
 
 
-def mean_stiffness(material: Material, mesh: Mesh) -> float:
-    """The mean of Young's modulus [Pa] in the middles of all cells, for small strains."""
+def mean_stiffness(case: Case, body: str, mesh: Mesh) -> float:
+    """The mean of Young's modulus [Pa] in the middles of all cells of a body, for small strains. Raises CaseError."""
     middles = mesh.points[mesh.cells].mean(axis=1).T
+    material = case.elastic_bodies[body].material
+    if isinstance(material, OwnLawSection):
+        from fsci.builder.own_law import own_law_at_rest
+
+        at_rest = own_law_at_rest(case, body, middles)
+        return young(at_rest.mu, lambda_of_bulk(at_rest.mu, at_rest.bulk))
     return float(np.mean(evaluate(combine(young, *material.lame), middles, 0.0)))

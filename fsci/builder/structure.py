@@ -15,8 +15,8 @@ from fsci.builder.named import named
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.checks import VECTORS
+from fsci.case.material import OwnLawSection
 from fsci.case.probes import Probe
-from fsci.case.structure import BodySection
 from fsci.case.values import value_of
 from fsci.meshes.locations import Locations, find_locations
 from fsci.meshes.of_case import read_body
@@ -75,7 +75,7 @@ def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: L
     assert case.structure is not None
     settings = case.elastic_bodies[name]
     vectors = {key: getattr(settings, key) for key in VECTORS}
-    material = _material(settings, case.structure.plane)
+    material = _material(case, name)
     loads = build_loads(settings, locations)
     return Body(name, mesh, material, element=settings.element, **loads, **vectors, comm=comm)
 
@@ -100,8 +100,14 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
     return meshes, locations
 
 
-def _material(body: BodySection, plane: str) -> Material:
+def _material(case: Case, name: str) -> Material:
+    assert case.structure is not None
+    body, plane = case.elastic_bodies[name], case.structure.plane
     settings = body.material
+    if isinstance(settings, OwnLawSection):
+        from fsci.builder.own_law import own_law
+
+        return own_law(case, name)
     density = 0.0 if settings.density is None else value_of(settings.density)
     mu, lmbda = settings.lame
     if plane == "stress":

@@ -63,6 +63,7 @@ class Case(Section):
 
     _document: Document = PrivateAttr()
     _places: Document | None = PrivateAttr(default=None)  # whose positions messages give; None: those of the document
+    _trusted: bool = PrivateAttr(default=False)
     _warnings: tuple[str, ...] = PrivateAttr(default=())
     _meshes: dict[str, str] = PrivateAttr(default_factory=dict)
 
@@ -85,6 +86,11 @@ class Case(Section):
     def settings(self) -> dict[str, Any]:
         """What the file says, overrides applied; not to be changed."""
         return dict(self._document.data)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether code of files that the case names may run."""
+        return self._trusted
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -161,7 +167,7 @@ class Case(Section):
     def with_places_of(self, other: Case) -> Case:
         """The same case, whose messages give positions in the file of another one of the same settings."""
         case = self.model_copy()
-        case._places = other._document
+        case._places, case._trusted = other._document, other._trusted
         return case
 
     def place(self, *keys: str | int) -> Place:

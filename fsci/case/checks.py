@@ -12,7 +12,7 @@ from fsci.case.errors import did_you_mean
 from fsci.case.fluid import Movement
 from fsci.case.fluid_checks import fluid_mistakes, movement_mistakes
 from fsci.case.free_checks import free_mistakes
-from fsci.case.material import HolzapfelGasserOgdenSection, has_mass
+from fsci.case.material import HolzapfelGasserOgdenSection, OwnLawSection, has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
 from fsci.case.shapes import ShapeSection
@@ -120,6 +120,8 @@ def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:
 def _element(case: Case, structure: StructureSection, body: BodySection, keys: Keys) -> Iterator[Mistake]:
     if body.kinematics == "linear" and isinstance(body.material, HolzapfelGasserOgdenSection):
         yield (*keys, "material", "law"), "'kinematics: linear' needs an isotropic law, and fibres carry tension only"
+    if body.kinematics == "linear" and isinstance(body.material, OwnLawSection):
+        yield (*keys, "material", "law"), "'kinematics: linear' needs a law of the program, such as 'neo_hooke'"
     if body.element != "mixed":
         return
     if case.dimension == 2 and structure.plane == "stress":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -17,11 +18,15 @@ from fsci.case.messages import problems
 from fsci.case.plausible import warnings
 from fsci.case.probe_checks import field_of
 
+#: Variable of the environment by which programs that a command starts have its `--trust`.
+TRUST = "FSCI_TRUST"
 
-def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Case:
+
+def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = (), *, trust: bool = False) -> Case:
     """Read, override and validate a case; raises CaseError with all problems found.
 
-    `path` is the file, or the folder with its case.yaml; `overrides` are dotted names and values as YAML text.
+    `path` is the file, or the folder with its case.yaml; `overrides` are dotted names and values as YAML text; with
+    `trust` code of files that the case names may run.
     """
     path = Path(path)
     document = read_document(path / "case.yaml" if path.is_dir() else path)
@@ -34,6 +39,7 @@ def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Ca
     except ValidationError as error:
         raise CaseError(problems(error, document)) from None
     case._document = document
+    case._trusted = trust or os.environ.get(TRUST) == "1"
     wrong = list(mistakes(case)) or value_mistakes(case)
     found = [document.problem(document.place(keys), message) for keys, message in wrong]
     if found:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+import re
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
     Dispersion,
     EntryCount,
+    Name,
     NotNegativeFormula,
     PoissonFormula,
     PositiveFormula,
     SpaceFormula,
     SpaceVector,
     chosen,
+    describe_value,
     value_of,
 )
 from fsci.distinct import distinct
@@ -181,14 +184,63 @@ class HolzapfelGasserOgdenSection(Section):
         )
 
 
+def _own_law(value: Any) -> Any:
+    if not isinstance(value, str) or not re.fullmatch(r".+\.py:[A-Za-z_]\w*", value):
+        raise fault(f"must be FILE.py:NAME, not {describe_value(value)}")
+    return value
+
+
+class OwnLawSection(Section):
+    """An energy of one's own: `law: FILE.py:NAME` is a function NAME(F, parameters by name) in a Python file.
+
+    It returns the stored energy per reference volume [J/m^3] as an expression of UFL; F is the deformation gradient,
+    3x3 in plane strain, too. The commands that run its code need the option `--trust`.
+    """
+
+    law: Annotated[
+        str,
+        BeforeValidator(_own_law),
+        WithJsonSchema({"type": "string", "pattern": r"\.py:", "$comment": "FILE.py:NAME"}),
+    ] = setting(..., "file, relative to the case file, and name of the function")
+    parameters: dict[Name, SpaceFormula] = setting(dict, "values of the function's parameters")
+    density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+
+    @property
+    def file(self) -> str:
+        """Path of the file, relative to the case file."""
+        return self.law.rpartition(":")[0]
+
+    @property
+    def function(self) -> str:
+        """Name of the function."""
+        return self.law.rpartition(":")[2]
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The parameters by name."""
+        return {name: value_of(value) for name, value in self.parameters.items()}
+
+
 def has_mass(material: MaterialSection) -> bool:
     """Whether it has a density that is not zero everywhere."""
     return material.density is not None and material.density.constant != 0.0
 
 
 LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "yeoh", "holzapfel_gasser_ogden")
-MaterialSection: TypeAlias = ElasticSection | MooneyRivlinSection | YeohSection | HolzapfelGasserOgdenSection
-Material = Annotated[MaterialSection, Field(discriminator="law"), chosen("law", LAWS)]
+LawSection: TypeAlias = ElasticSection | MooneyRivlinSection | YeohSection | HolzapfelGasserOgdenSection
+MaterialSection: TypeAlias = LawSection | OwnLawSection
+
+
+def _is_own(value: Any) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("law"), str) and ".py" in value["law"]
+
+
+# The tags are no names of settings, so that an error's path cannot be misread.
+Material = Annotated[
+    Annotated[LawSection, Field(discriminator="law"), chosen("law", LAWS, "FILE.py:NAME"), Tag("law of the program")]
+    | Annotated[OwnLawSection, Tag("own law")],
+    Discriminator(lambda value: "own law" if _is_own(value) else "law of the program"),
+]
 
 #: Section -> an example of it.
 MATERIAL_EXAMPLES = {
@@ -199,4 +251,5 @@ MATERIAL_EXAMPLES = {
         "material: {law: holzapfel_gasser_ogden, mu: 7.6e3, k1: 9.966e5, k2: 524.6, dispersion: 0.226,\n"
         "           fibres: [[1, 0, 0.85], [1, 0, -0.85]], bulk: 1e6, density: 1100}"
     ),
+    "OwnLaw": "material: {law: gent.py:Gent, parameters: {mu: 4e5, limit: 30, bulk: 1e8}, density: 1100}",
 }

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from fsci.case.case import Case
 from fsci.case.jumps import jump_warnings
-from fsci.case.material import Material
+from fsci.case.material import MaterialSection, OwnLawSection
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import flow_warnings, in_si
 from fsci.case.plausible_gravity import gravity_warnings
@@ -64,7 +64,7 @@ def _order_from_file(mesh: object) -> bool:
     return isinstance(mesh, FileMesh) and not mesh.file.endswith(".geo")
 
 
-def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys, str]]:
+def _material(case: Case, material: MaterialSection, keys: Keys) -> Iterator[tuple[Keys, str]]:
     units = case.units
     density = None if material.density is None else material.density.constant
     if density and not SOLID_DENSITIES[0] <= density * units.density <= SOLID_DENSITIES[1]:
@@ -81,7 +81,9 @@ def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys
         yield (*keys, key), f"implausible stiffness: Young's modulus {value}; check 'units'"
 
 
-def _constants(material: Material) -> tuple[float, float] | None:
-    """(mu, lambda) at small strains, in the case's unit; None if they vary."""
+def _constants(material: MaterialSection) -> tuple[float, float] | None:
+    """(mu, lambda) at small strains, in the case's unit; None if they vary, or are in a file with code."""
+    if isinstance(material, OwnLawSection):
+        return None
     mu, lmbda = material.lame
     return None if callable(mu) or callable(lmbda) else (mu, lmbda)

@@ -256,19 +256,19 @@ SwitchOrNotNegative = Annotated[
 Surfaces = Annotated[tuple[Text, ...], EntryCount(1, None), OneOrMany()]
 
 
-def chosen(key: str, names: Sequence[str]) -> BeforeValidator:
-    """A section whose other settings depend on `key`, which is one of the names."""
+def chosen(key: str, names: Sequence[str], *others: str) -> BeforeValidator:
+    """A section whose other settings depend on `key`, which is one of the names; `others` are words for what else."""
 
     def check(value: Any) -> Any:
         if not isinstance(value, dict):
             raise fault(f"must be a section with '{key}', not {describe_value(value)}")
         if key not in value:
-            raise fault(f"needs the setting '{key}' (available: {', '.join(names)})")
+            raise fault(f"needs the setting '{key}' (available: {', '.join((*names, *others))})")
         word = value[key]
         if not isinstance(word, str):
-            raise fault(f"must be {listed(names)}, not {describe_value(word)}", key)
+            raise fault(f"must be {listed((*names, *others))}, not {describe_value(word)}", key)
         if word not in names:
-            raise fault(f"unknown {key} '{word}'{did_you_mean(word, names)}", key)
+            raise fault(f"unknown {key} '{word}'{did_you_mean(word, (*names, *others))}", key)
         return value
 
     return BeforeValidator(check)

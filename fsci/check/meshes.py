@@ -17,6 +17,7 @@ from fsci.builder.skin import find_skin
 from fsci.case import Case, CaseError
 from fsci.case.contact import PairSection
 from fsci.case.errors import Problem
+from fsci.case.material import OwnLawSection
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
@@ -38,6 +39,9 @@ from solvers.mesh.locate import locate
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.tessellation import tessellate
 from solvers.mesh.topology import signed_volumes, surface_facets
+
+#: Stress of an undeformed body over its stiffness that is rounding.
+STRESS_OF_ROUNDING = 1e-12
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
@@ -86,6 +90,7 @@ def _check(case: Case) -> Findings:
 
         case = found.attempt(partial(with_pairs, case)) or case
     found.pairs = {} if case.contact is None else case.contact.pairs
+    _own_laws(case, found)
     _elastic(case, found)
     if case.contact is not None:
         for name, obstacle in case.contact.obstacles.items():
@@ -145,6 +150,21 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
         stiff = stiff_slaves(case, found.meshes, found.pairs)  # none of those that the program finds
         found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in stiff]
+
+
+def _own_laws(case: Case, found: Findings) -> None:
+    """Laws in files of the user: mistakes of their code, and a stress without a strain."""
+    for name, body in case.elastic_bodies.items():
+        if not isinstance(body.material, OwnLawSection):
+            continue
+        from fsci.builder.own_law import own_law_at_rest
+
+        mesh = found.attempt(partial(read_body, case, name))
+        at_rest = mesh and found.attempt(partial(own_law_at_rest, case, name, mesh.points[mesh.cells].mean(axis=1).T))
+        if at_rest and at_rest.stress > STRESS_OF_ROUNDING * (at_rest.mu + at_rest.bulk):
+            place = case.place("structure", "bodies", name, "material", "law")
+            words = f"a stress of {at_rest.stress:.4g} Pa in the undeformed body '{name}'"
+            found.warnings.append(f"{place}: '{body.material.function}' gives {words}")
 
 
 def _elastic(case: Case, found: Findings) -> None:

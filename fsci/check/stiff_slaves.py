@@ -26,7 +26,7 @@ def stiff_slaves(case: Case, meshes: Mapping[str, Mesh], pairs: Mapping[str, Pai
         slave, master = (side.body for side in sides)
         if pair.tied or slave is None or master is None or slave == master:
             continue
-        one, other = (mean_stiffness(case.elastic_bodies[body].material, meshes[body]) for body in (slave, master))
+        one, other = (mean_stiffness(case, body, meshes[body]) for body in (slave, master))
         if one <= STIFFER * other:
             continue
         fine, coarse = (face(meshes[str(side.body)], side.on).size for side in sides)

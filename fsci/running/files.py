@@ -24,7 +24,7 @@ LOCK = ".fsci-lock"
 
 FILES = ("case.yaml", "summary.json", "history.csv", "log.txt", "report.html", "STOP")
 FOLDERS = ("fields", "checkpoint", "failure", "pictures")
-COPIES = ("meshes", "curves")  #: folders of files that the case names and that have no place of their own
+COPIES = ("meshes", "curves", "laws")  #: folders of files that the case names and that have no place of their own
 
 UNFINISHED = ".tmp"  #: ending of the names of files that are being written
 

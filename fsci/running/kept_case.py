@@ -7,9 +7,10 @@ import os
 from collections.abc import Iterator, Mapping
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fsci.case import Case, load_case
+from fsci.case.material import OwnLawSection
 from fsci.meshes.parts import Named, all_files, real
 from fsci.running.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, copy_file, make_folder, replacing, write_text
 
@@ -19,14 +20,24 @@ RESERVED_FILES = {name.casefold() for name in (*FILES, *FOLDERS, MARKER, LOCK)}
 Targets = dict[Path, Path]  #: file -> name of its copy in the folder
 
 
+class Given(NamedTuple):
+    """A file that a setting names."""
+
+    setting: str  #: with dots between its names
+    of: str  #: name of the body, obstacle or curve
+    folder: str  #: of copies that have no place of their own
+    file: str  #: relative to the case file
+    rest: str = ""  #: what follows it in the setting
+
+
 def keep_case(case: Case, folder: Path) -> None:
     """Write case.yaml and the files it names, such that the folder can be moved and run again."""
     folder.mkdir(parents=True, exist_ok=True)
     changes = []
-    for setting, given, files, targets in _placed(case):
-        kept = targets[real(case.folder / given)]
-        if Path(given) != kept:
-            changes.append((setting, json.dumps(kept.as_posix())))
+    for given, files, targets in _placed(case):
+        kept = targets[real(case.folder / given.file)]
+        if Path(given.file) != kept:
+            changes.append((given.setting, json.dumps(kept.as_posix() + given.rest)))
         for file, names in files.items():
             _copy(file, names, targets, folder)
     write_text(folder / "case.yaml", case.dump(changes))
@@ -43,52 +54,55 @@ def copies(case: Case) -> Iterator[tuple[Path, Path]]:
         yield from targets.items()
 
 
-def _placed(case: Case) -> Iterator[tuple[str, str, dict[Path, list[Named]], Targets]]:
-    """(setting, its file, that file with those that it names, their copies) of meshes and curves in files.
+def _placed(case: Case) -> Iterator[tuple[Given, dict[Path, list[Named]], Targets]]:
+    """(file, that file with those that it names, their copies) of all files that settings name.
 
-    Settings have dots between their names. Copies have the names of the files in the folder of the case, as long as all
+    Copies have the names of the files in the folder of the case, as long as all
     of a mesh are in that folder and have no names of results. Others are in a folder of the name of the body, obstacle
     or curve, with a number if it is taken.
     """
     home, placed, taken = case.folder.resolve(), dict[Path, Targets](), Targets()  # taken: by names without case
-    named = [(setting, name, given, _files(case, setting, given)) for setting, name, given in _named_files(case)]
-    for *_, files in named:
+    named = [(given, _files(case, given)) for given in _given_files(case)]
+    for _, files in named:
         if all(file.is_relative_to(home) for file in files):
             targets = {file: file.relative_to(home) for file in files}
             if not any(map(_reserved, targets.values())) and _free(targets, taken):
                 placed[next(iter(files))] = targets
                 taken |= {_folded(kept): file for file, kept in targets.items()}
-    for setting, name, given, files in named:
+    for given, files in named:
         source = next(iter(files))
         if source not in placed:
-            kind = "curves" if setting.startswith("curves.") else "meshes"
-            tries = (_together(files, Path(kind, numbered)) for numbered in _numbered(name))
+            tries = (_together(files, Path(given.folder, numbered)) for numbered in _numbered(given.of))
             placed[source] = targets = next(targets for targets in tries if _free(targets, taken))
             taken |= {_folded(kept): file for file, kept in targets.items()}
-        yield setting, given, files, placed[source]
+        yield given, files, placed[source]
 
 
-def _files(case: Case, setting: str, given: str) -> dict[Path, list[Named]]:
+def _files(case: Case, given: Given) -> dict[Path, list[Named]]:
     """The file of a setting, first, and those that it names."""
-    source = real(case.folder / given)
-    return {source: []} | ({} if setting.startswith("curves.") else all_files(source))
+    source = real(case.folder / given.file)
+    return {source: []} | (all_files(source) if given.folder == "meshes" else {})
 
 
-def _named_files(case: Case) -> Iterator[tuple[str, str, str]]:
-    """(setting, name of what it is for, file) of the meshes of bodies and obstacles, and of curves, in files."""
+def _given_files(case: Case) -> Iterator[Given]:
+    """Of meshes, laws and curves."""
     groups: dict[str, Mapping[str, Any]] = {
         "structure.bodies": case.elastic_bodies,
         "fluid.bodies": {} if case.fluid is None else case.fluid.bodies,
         "rigid.bodies": {} if case.rigid_section is None else case.rigid_section.bodies,
         "contact.obstacles": {} if case.contact is None else case.contact.obstacles,
     }
-    found = [
-        (f"{group}.{name}.mesh.file", name, getattr(member.mesh, "file", None))
-        for group, members in groups.items()
-        for name, member in members.items()
-    ]
-    found += [(f"curves.{name}.csv", name, curve.csv) for name, curve in case.curves.items()]
-    yield from ((setting, name, given) for setting, name, given in found if given is not None)
+    for group, members in groups.items():
+        for name, member in members.items():
+            if (file := getattr(member.mesh, "file", None)) is not None:
+                yield Given(f"{group}.{name}.mesh.file", name, "meshes", file)
+    for name, body in case.elastic_bodies.items():
+        if isinstance(body.material, OwnLawSection):
+            setting, rest = f"structure.bodies.{name}.material.law", f":{body.material.function}"
+            yield Given(setting, name, "laws", body.material.file, rest)
+    for name, curve in case.curves.items():
+        if curve.csv is not None:
+            yield Given(f"curves.{name}.csv", name, "curves", curve.csv)
 
 
 def _reserved(kept: Path) -> bool:

@@ -17,7 +17,7 @@ from array import array
 from collections.abc import Sequence
 from typing import Any
 
-from fsci.running.child import ENVIRONMENT
+from fsci.running.child import environment
 from fsci.running.copied_process import fsci, import_common, run_in_copy
 
 PROCESS_HAS_ENDED = "the process that runs are copies of has ended"
@@ -63,7 +63,7 @@ class WarmProcess:
             try:
                 with theirs:
                     program = [sys.executable, "-m", "fsci.running.warm"]
-                    self._process = subprocess.Popen(program, stdin=theirs.fileno(), env=ENVIRONMENT)
+                    self._process = subprocess.Popen(program, stdin=theirs.fileno(), env=environment())
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return self._control

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from fsci.running.child import ENVIRONMENT, command
+from fsci.running.child import command, environment
 from fsci.running.history import History, read_history
 from fsci.stress.mutants import cases
 from fsci.stress.program import steps_done, write
@@ -28,7 +28,7 @@ def long_run(steps: int, parts: int = 10) -> list[Row]:
         write(folder, {**cases()["long"], "time": {"step": STEP, "end": steps * STEP}})
         with (folder / "words.txt").open("w") as words:
             arguments = command("run", str(folder), "-o", str(folder / "out"))
-            process = subprocess.Popen(arguments, stdout=words, stderr=words, env=ENVIRONMENT)
+            process = subprocess.Popen(arguments, stdout=words, stderr=words, env=environment())
         try:
             spent = _watch(process, folder, [steps * (i + 1) // parts for i in range(parts)])
         finally:

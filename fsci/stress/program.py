@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fsci.running.child import ENVIRONMENT, command
+from fsci.running.child import command, environment
 from fsci.running.history import History, read_history
 
 NEVER_ENDED = -1000  #: code of a run that was given up
@@ -54,7 +54,7 @@ def run_killed(folder: Path, case: Mapping[str, Any], *, steps: int, delay: floa
     write(folder, case)
     arguments = command("run", str(folder), "-o", str(folder / "out"))
     with (folder / "words.txt").open("w") as words:
-        process = subprocess.Popen(arguments, stdout=words, stderr=words, env=ENVIRONMENT)
+        process = subprocess.Popen(arguments, stdout=words, stderr=words, env=environment())
     end = time.monotonic() + patience
     while process.poll() is None and steps_done(folder) < steps and time.monotonic() < end:
         time.sleep(0.005)
@@ -78,7 +78,7 @@ def steps_done(folder: Path) -> int:
 
 def _ended(folder: Path, arguments: list[str], patience: float) -> Ended:
     try:
-        done = subprocess.run(arguments, capture_output=True, text=True, env=ENVIRONMENT, timeout=patience)
+        done = subprocess.run(arguments, capture_output=True, text=True, env=environment(), timeout=patience)
     except subprocess.TimeoutExpired as late:
         said = (late.stdout or b"") + (late.stderr or b"")
         return Ended(NEVER_ENDED, said.decode(errors="replace") if isinstance(said, bytes) else str(said), {}, {})

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fsci.case import Case, CaseError, load_case
-from fsci.running.child import ENVIRONMENT, command
+from fsci.running.child import command, environment
 from fsci.running.history import History, read_history
 from fsci.running.kept_case import copies
 from fsci.running.warm import WarmProcess
@@ -92,7 +92,7 @@ def _run(warm: WarmProcess, case: Path, settings: Settings, twin: Twin, folder: 
         ended = warm.run(*words)
     else:
         launched = command(*words, processes=twin.processes)
-        ended = subprocess.run(launched, capture_output=True, text=True, env=ENVIRONMENT)
+        ended = subprocess.run(launched, capture_output=True, text=True, env=environment())
     if not (folder / "summary.json").exists() or ended.returncode not in (0, 1):
         return TwinEnded(twin, message=(ended.stderr or ended.stdout).strip())
     return _read(case, settings, twin, folder, checksum)
