@@ -1,7 +1,7 @@
 """Do the tests notice a wrong operator? python tests/mutate.py [--count N] [--seed S] [--group NAME]
 
-Replaces one random operator at a time (+ - * / < >) in forms, mortar and time schemes, runs the tests of that part, and
-prints the mutants that pass all of them. Works in place, on a clean checkout; every file is put back.
+Replaces one random operator at a time (+ - * / < >) in forms, mortar, time schemes and geometry, runs the tests of that
+part, and prints the mutants that pass all of them. Works in place, on a clean checkout; every file is put back.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         tuple(f"solvers/fluid/terms/poorly_cut/{name}.py" for name in (
             "extension_penalty", "face_penalty", "ghost", "ghost_choice", "penalty_matrix",
         )),
-        ("fluid_ghost", "fluid_extension", "fluid_film", "fluid_tangent", "fluid_patch", "fluid_stretched", "constants"),
+        ("fluid_ghost", "fluid_extension", "fluid_film", "fluid_tangent", "fluid_patch", "fluid_stretched",
+         "constants"),
     ),
     "closed_contact": (
         tuple(f"solvers/fluid/terms/closed_contact/{name}.py" for name in ("zone", "zone_entries", "zone_seepage")),
