@@ -1,5 +1,6 @@
 import os
 import subprocess
+import sys
 import time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -42,6 +43,12 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.section(f"left out, {NO_TIME}")
         for name in left_out:
             terminalreporter.line(name)
+
+
+def pytest_unconfigure():
+    """End the processes that stand by."""
+    if "programs" in sys.modules:
+        sys.modules["programs"].STANDING.close()
 
 
 @pytest.fixture

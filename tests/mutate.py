@@ -1,7 +1,7 @@
 """Do the tests notice a wrong operator? python tests/mutate.py [--count N] [--seed S] [--group NAME]
 
-Replaces one random operator at a time (+ - * / < >) in forms, mortar and time schemes, runs the tests of that part, and
-prints the mutants that pass all of them. Works in place, on a clean checkout; every file is put back.
+Replaces one random operator at a time (+ - * / < >) in forms, mortar, time schemes and geometry, runs the tests of that
+part, and prints the mutants that pass all of them. Works in place, on a clean checkout; every file is put back.
 """
 
 from __future__ import annotations
@@ -56,6 +56,49 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         )),
         ("contact_system", "contact_patch", "contact_friction", "friction_held", "contact_held", "contact_several",
          "sharp_edges", "tying", "search", "friction_patch", "constants", "self_contact"),
+    ),
+    "cutting": (
+        tuple(f"solvers/fluid/cut/{name}.py" for name in ("cut", "extension", "pockets", "weights")),
+        ("fluid_extension", "pockets", "fluid_pockets_kept", "fluid_pieces", "fluid_patch", "fluid_entering",
+         "carry_over", "fluid_slits", "fluid_overlaps", "fluid_history", "fluid_nested", "fluid_parallel"),
+    ),
+    "geometry": (
+        (
+            *(f"solvers/cut_cells/{name}.py" for name in ("components", "heights", "layer", "make", "surfaces")),
+            *(f"solvers/fluid/geometry/{name}.py" for name in ("overlaps", "pieces", "tied_slits", "triangle_pieces")),
+            *(f"solvers/fluid/geometry/regions/{name}.py" for name in (
+                "cell_regions", "face_regions", "region_integrals", "regions", "sliced_facets", "space_parts",
+                "touching_cells", "touching_regions", "wet_edges",
+            )),
+        ),
+        ("cut_cells", "cut_cells_again", "cut_cells_closing", "cut_cells_oracles", "cell_regions", "fluid_pieces",
+         "fluid_triangle_pieces", "fluid_overlaps", "fluid_slits", "fluid_touching", "fluid_touching_space"),
+    ),
+    "thin": (
+        tuple(f"solvers/fluid/geometry/thin/{name}.py" for name in (
+            "closing", "sheet_cycles", "sheet_nodes", "sheet_parts", "sheet_windows", "sheets", "thickness", "thinness",
+        )),
+        ("fluid_thin", "fluid_thin_space", "fluid_thin_moving", "fluid_thin_space_moving", "fluid_touching",
+         "fluid_triangle_pieces", "thin_rigid", "thin_elastic"),
+    ),
+    "films": (
+        (
+            "solvers/fluid/cut/film.py", "solvers/fluid/cut/gaps.py", "solvers/fluid/terms/gap_terms.py",
+            *(f"solvers/fluid/terms/shape_derivatives/{name}.py" for name in ("film_crossings", "film_shape")),
+        ),
+        ("film_crossings", "fluid_film", "fluid_film_shape", "fluid_gap", "fluid_gaps", "fluid_closing",
+         "fsci_lubrication", "constants"),
+    ),
+    "poorly_cut": (
+        tuple(f"solvers/fluid/terms/poorly_cut/{name}.py" for name in (
+            "extension_penalty", "face_penalty", "ghost", "ghost_choice", "penalty_matrix",
+        )),
+        ("fluid_ghost", "fluid_extension", "fluid_film", "fluid_tangent", "fluid_patch", "fluid_stretched",
+         "constants"),
+    ),
+    "closed_contact": (
+        tuple(f"solvers/fluid/terms/closed_contact/{name}.py" for name in ("zone", "zone_entries", "zone_seepage")),
+        ("fluid_zone", "fluid_seepage", "fluid_zone_seepage", "fsci_hydrostatic", "coupling_blocks"),
     ),
     "kernels": (
         tuple(f"solvers/kernels/{name}.hpp" for name in (

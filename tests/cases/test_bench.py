@@ -119,12 +119,14 @@ def test_second_order_ball():
     assert np.abs(np.sort(corners, axis=0) - np.sort(fine.points, axis=0)).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_studies_measure_what_they_say():
     """Few cells: the drag in a film of 0.2 cells, and the flow around a sphere."""
     assert studies.film("q2q1", 0.1)["error [%]"] < 3.0 < studies.film("q1q1", 0.1)["error [%]"]
     assert studies.decay("q1q1", "bdf2", 6)["error [%]"] < 5.0
 
 
+@pytest.mark.slow
 def test_the_drag_of_a_sphere_near_a_wall():
     """Brenner (1961), table 1: 9.2518 at cosh(0.5) - 1; on cells of four gaps it is within a tenth."""
     assert studies.brenner(np.cosh(0.5) - 1.0) == pytest.approx(9.2518, abs=1e-4)
@@ -144,6 +146,7 @@ def test_each_member_of_a_family_could_begin(name, tmp_path):
             load_case(scene.folder, [(key, json.dumps(value)) for key, value in {**scene.settings, **exact}.items()])
 
 
+@pytest.mark.slow
 def test_cells_halved_around_the_cylinder_cost_less():
     """2D-1: a tenth of the error with twice the unknowns."""
     nested = FAMILIES["nested"]

@@ -1,21 +1,19 @@
 """The examples of the library page run as they stand and print what they should."""
 
 import re
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import on_processes
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
 def numbers(name: str, *arguments: Path) -> list[list[float]]:
     """The numbers of each line that an example prints."""
-    done = subprocess.run([sys.executable, EXAMPLES / f"{name}.py", *arguments], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    done = on_processes(1, EXAMPLES / f"{name}.py", *arguments)
     return [
         [float(text) for text in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", line)] for line in done.stdout.splitlines()
     ]

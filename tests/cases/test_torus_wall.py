@@ -25,6 +25,8 @@ COARSE = {
     "output.fields_every": "1",
     "verify": "[]",  # the case's numbers are those of its own grid
 }
+pytestmark = pytest.mark.slow
+
 #: of the torus [Pa]
 BULK = 4000.0 / (3.0 * (1.0 - 2.0 * 0.4))
 

@@ -79,10 +79,16 @@ def run(text: str, folder):
     return read_history(folder / "out" / "history.csv")
 
 
-@pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
-def test_each_moves_as_it_does_alone(scheme, tmp_path):
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """History of both bodies."""
+    return run(scene("monolithic"), tmp_path_factory.mktemp("composite") / "both")
+
+
+@pytest.mark.parametrize("scheme", ["monolithic", pytest.param("partitioned", marks=pytest.mark.slow)])
+def test_each_moves_as_it_does_alone(scheme, tmp_path, whole):
     """The start, the iteration and the balances of both kinds are those of each kind alone."""
-    both = run(scene(scheme), tmp_path / "both")
+    both = whole if scheme == "monolithic" else run(scene(scheme), tmp_path / "both")
     flap = run(scene(scheme, free=False), tmp_path / "flap")
     disc = run(scene(scheme, elastic=False), tmp_path / "disc")
     assert abs(both["tip.x"][-1]) > 1e-4
@@ -134,8 +140,7 @@ def test_a_thrown_disc_shares_its_momentum_beside_an_elastic_body(tmp_path):
         np.testing.assert_allclose(both[column], alone[column], rtol=1e-7, atol=1e-9)
 
 
-def test_a_resumed_run_is_the_same(tmp_path):
-    whole = run(scene("monolithic"), tmp_path / "whole")
+def test_a_resumed_run_is_the_same(tmp_path, whole):
     text = scene("monolithic").replace("end: 0.15", "end: 0.1")
     run(text, tmp_path / "part")
     assert resume_run(tmp_path / "part" / "out", [("time.end", "0.15")]) == FINISHED

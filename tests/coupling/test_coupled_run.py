@@ -91,8 +91,10 @@ def with_scheme(scheme: str) -> str:
 
 
 @pytest.fixture(scope="module", params=list(SCHEMES))
-def whole(request, tmp_path_factory):
+def whole(request, tmp_path_factory, monolithic):
     """(scheme, results folder, history) of the whole run."""
+    if request.param == "monolithic":
+        return request.param, *monolithic
     folder = tmp_path_factory.mktemp(request.param)
     return request.param, folder / "out", run(with_scheme(request.param), folder)
 
@@ -103,6 +105,7 @@ def monolithic(tmp_path_factory):
     return folder / "out", run(POST, folder)
 
 
+@pytest.mark.parametrize("whole", ["iqn", "aitken"], indirect=True)
 def test_all_schemes_agree(whole, monolithic):
     """To 10 times the tolerance of the coupling."""
     _, _, history = whole
@@ -150,7 +153,9 @@ def test_resumed_bit_for_bit(whole, tmp_path):
         assert np.array_equal(expected[name], resumed[name]), name
 
 
-@pytest.mark.parametrize("at", [1, 3])
+@pytest.mark.parametrize(
+    ("whole", "at"), [("monolithic", 1), ("monolithic", 3), ("iqn", 3), ("aitken", 1)], indirect=["whole"]
+)
 def test_a_failed_step_does_not_change_the_state(at, whole, tmp_path, monkeypatch):
     """It is repeated as two halves; the same to the last bit whether it fails at its end or before it begins."""
     scheme, _, _ = whole

@@ -33,7 +33,7 @@ def zeros(values: np.ndarray, dt: float) -> np.ndarray:
     return t[change] - values[change] * dt / (values[change + 1] - values[change])
 
 
-@pytest.mark.parametrize("ratio", [10.0, 1.0, 0.1])
+@pytest.mark.parametrize("ratio", [10.0, pytest.param(1.0, marks=pytest.mark.slow), 0.1])
 def test_frequency(ratio: float):
     omega = BAR_MODES[ratio]
     dt = 2.0 * np.pi / omega / 60.0
@@ -43,7 +43,9 @@ def test_frequency(ratio: float):
     assert max(iterations) <= 3
 
 
-@pytest.mark.parametrize("accelerator", [Aitken(0.5), QuasiNewton(0.5)], ids=["aitken", "iqn"])
+@pytest.mark.parametrize(
+    "accelerator", [pytest.param(Aitken(0.5), marks=pytest.mark.slow), QuasiNewton(0.5)], ids=["aitken", "iqn"]
+)
 def test_both_schemes_take_the_same_way(accelerator):
     """25 steps with the heavy fluid, ratio 0.1, and some with the light one."""
     for ratio, steps in ((0.1, 25), (10.0, 5)):

@@ -52,6 +52,10 @@ output: {{{{fields_every: 0}}}}
 """
 
 
+#: the start of each is quick (`test_cylinder_in_a_round_tank`)
+SCHEMES = ["bdf2", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bdf2_optimized", "backward_euler"))]
+
+
 def speeds(folder, text, name="v.x"):
     (folder / "case.yaml").write_text(text)
     assert run_case(load_case(folder / "case.yaml"), folder / "run") == FINISHED
@@ -87,7 +91,7 @@ def velocities(folder, young, rho_inf, scheme, step):
     return momentum / read_history(folder / "run" / "history.csv")["m"][0]
 
 
-@pytest.mark.parametrize(("young", "rho_inf"), [(1e4, 0.0), (1e6, 0.8)])
+@pytest.mark.parametrize(("young", "rho_inf"), [(1e4, 0.0), pytest.param(1e6, 0.8, marks=pytest.mark.slow)])
 def test_elastic_cylinder(tmp_path, young, rho_inf):
     """Steps do not resolve its waves. Its mean velocity ended 19 % too low."""
     found = velocities(tmp_path, young, rho_inf, "bdf2", 0.02)
@@ -121,7 +125,7 @@ def test_elastic_cylinder_is_resumed(tmp_path):
     assert (read_history(tmp_path / "parts" / "run" / "history.csv")["p.x"] == whole).all()
 
 
-@pytest.mark.parametrize("scheme", ["bdf2", "bdf2_optimized", "backward_euler"])
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_steps_that_change_while_it_coasts(tmp_path, scheme):
     """By a factor of 1/50, as after many retries."""
     text = CYLINDER.format(step=0.02, end=0.1, scheme=scheme, coupling="monolithic", x=0.0)
@@ -133,7 +137,7 @@ def test_steps_that_change_while_it_coasts(tmp_path, scheme):
     assert found[5:] == pytest.approx(found[4], rel=2e-4)
 
 
-@pytest.mark.parametrize("scheme", ["bdf2", "bdf2_optimized", "backward_euler"])
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_load_in_the_middle_of_a_run(tmp_path, scheme):
     """A push of two steps gives the momentum of 0.1 m/s to a cylinder that coasts. The step hardly resolves it."""
     gravity = 'gravity: ["where(abs(t - 0.12) < 0.02, 5 * (1 - abs(t - 0.12) / 0.02), 0)", 0]'
@@ -143,7 +147,14 @@ def test_load_in_the_middle_of_a_run(tmp_path, scheme):
     assert found[-4:] == pytest.approx(0.2 / 2.25, rel=0.004)
 
 
-@pytest.mark.parametrize(("scheme", "swing"), [("bdf2", 4), ("bdf2_optimized", 6), ("backward_euler", 2)])
+@pytest.mark.parametrize(
+    ("scheme", "swing"),
+    [
+        pytest.param("bdf2", 4, marks=pytest.mark.slow),
+        pytest.param("bdf2_optimized", 6, marks=pytest.mark.slow),
+        ("backward_euler", 2),
+    ],
+)
 def test_motion_that_jumps_in_the_middle_of_a_run(tmp_path, scheme, swing):
     """The impulses of some steps swing; they add up to that of the added mass, and then there is no force."""
     head, _ = CYLINDER.split("coupling:")
@@ -194,6 +205,7 @@ output: {fields_every: 0}
 """
 
 
+@pytest.mark.slow
 def test_ball_in_a_ball(tmp_path):
     assert speeds(tmp_path, BALL_IN_BALL) == pytest.approx(0.1 / (1.0 + 5.0 / 7.0), rel=0.005)
 

@@ -53,7 +53,7 @@ def rates(folder, *, step=0.02, steps=6, scheme="monolithic", solid=ELASTIC, top
     return np.diff(read_history(folder / "run" / "history.csv")["momentum.y"], prepend=0.0) / step
 
 
-@pytest.mark.parametrize("step", [0.02, 0.01, 0.005])
+@pytest.mark.parametrize("step", [0.02, pytest.param(0.01, marks=pytest.mark.slow), 0.005])
 def test_a_disc_in_fluid_of_its_density_starts_smoothly(step, tmp_path):
     """The rate is within 1 % of a straight line from the first step on; the disc alone would begin with -0.78."""
     found = rates(tmp_path, step=step)

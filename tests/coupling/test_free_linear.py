@@ -15,7 +15,7 @@ fluid:
   viscosity: 1
   flow: stokes
   scheme: bdf2
-  grid: {from: [0, 0, 0], to: [1, 1, 1.6], cells: [10, 10, 16]}
+  grid: {from: [0, 0, 0], to: [1, 1, 1.6], cells: [8, 8, 13]}
   patches: {walls: {on: [x-, x+, y-, y+, z-, z+], no_slip: true}}
   bodies:
     light:

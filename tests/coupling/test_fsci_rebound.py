@@ -78,7 +78,7 @@ def test_film_of_a_fast_ball_converges():
     assert scheme.coupled.flow.moving.motions[0].x[:, 1].min() < 0.02
 
 
-@pytest.mark.parametrize("accelerator", ["iqn", "aitken"])
+@pytest.mark.parametrize("accelerator", ["iqn", pytest.param("aitken", marks=pytest.mark.slow)])
 def test_both_schemes_agree(accelerator):
     """Each step from the same state: through first contact, more nodes and fewer, with the same result.
 

@@ -80,7 +80,7 @@ def history(folder, text):
     [
         ("backward_euler", "monolithic"),
         ("bdf2", "monolithic"),
-        ("bdf2_optimized", "monolithic"),
+        pytest.param("bdf2_optimized", "monolithic", marks=pytest.mark.slow),
         ("backward_euler", "partitioned"),
     ],
 )

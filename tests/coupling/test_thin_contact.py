@@ -73,6 +73,7 @@ def test_flap_that_stays_apart(tmp_path):
     assert 1e-3 < history["flow"][-1] < 2e-3
 
 
+@pytest.mark.slow
 def test_flap_that_opens_again(tmp_path):
     """The pressure turns round after the flap has sealed the channel, and pulls both apart: no step is repeated."""
     history = history_of(tmp_path, E=2.5e5, end=3.5, back=1.6)

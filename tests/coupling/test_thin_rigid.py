@@ -67,7 +67,7 @@ solver: {newton: {residual: 1.0e-13}}
 """
 
 
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
 def test_plate_that_is_pushed_along_a_channel(element, tmp_path):
     """Fluid of 2.98 kg and the plate of 1.2 kg have the acceleration 0.5 N / 4.18 kg; nothing passes the plate."""
     history = run(PUSHED.replace("ELEMENT", element), tmp_path)

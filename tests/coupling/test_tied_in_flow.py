@@ -120,7 +120,7 @@ def run(folder, text):
     [
         (f"slave: {HIGH}, master: {LOW}", 5, "monolithic", 0.81),
         (f"slave: {LOW}, master: {HIGH}", 5, "monolithic", 0.81 + 0.05 / 3),
-        (f"slave: {HIGH}, master: {LOW}", 4, "partitioned", 0.81),
+        pytest.param(f"slave: {HIGH}, master: {LOW}", 4, "partitioned", 0.81, marks=pytest.mark.slow),
     ],
 )
 def test_halves_with_other_cells_move_as_those_with_the_same(tmp_path, pair, cells, scheme, x):

@@ -65,7 +65,11 @@ def run(bodies, law, dt, end=0.3):
 
 
 @pytest.mark.parametrize(
-    ("velocity", "spin", "law"), [(2.0, 0.0, Coulomb(0.3)), (2.0, 2.0, Frictionless())], ids=["friction", "spin"]
+    ("velocity", "spin", "law"),
+    [
+        pytest.param(2.0, 0.0, Coulomb(0.3), id="friction"),
+        pytest.param(2.0, 2.0, Frictionless(), id="spin", marks=pytest.mark.slow),
+    ],
 )
 def test_a_disc_beside_a_block(velocity, spin, law):
     """Inertia and internal forces are right; the error of contact does not grow with fewer or more steps."""

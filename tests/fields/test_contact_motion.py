@@ -11,7 +11,9 @@ from contact_cases import BEFORE, COLLISION, PLATE, run
 from solvers.structure.elastic_constants import lame
 
 
-@pytest.mark.parametrize(("step", "end"), [("0.02", "1.0"), ("0.005", "1.0"), ("0.00125", "0.15")])
+@pytest.mark.parametrize(
+    ("step", "end"), [("0.02", "1.0"), pytest.param("0.005", "1.0", marks=pytest.mark.slow), ("0.00125", "0.15")]
+)
 def test_contact_gives_no_energy(step, end, tmp_path):
     """Without damping; impact may take some (10.2 % with the large step, 1.1 % with the others).
 

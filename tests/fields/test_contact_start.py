@@ -78,7 +78,10 @@ def end_of_a_pushed_bar(rho_inf, dt):
     return structure.now.u.copy()
 
 
-@pytest.mark.parametrize("rho_inf", [1.0, 0.5])
+DAMPING = [pytest.param(0.001, id="weak", marks=pytest.mark.slow), pytest.param(0.05, id="strong")]
+
+
+@pytest.mark.parametrize("rho_inf", [pytest.param(1.0, marks=pytest.mark.slow), 0.5])
 def test_second_order_with_a_sudden_load(rho_inf):
     dt = 0.00125
     coarse, middle, fine = (end_of_a_pushed_bar(rho_inf, dt / 2**k) for k in range(3))
@@ -87,7 +90,7 @@ def test_second_order_with_a_sudden_load(rho_inf):
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.15)
 
 
-@pytest.mark.parametrize("damping", [0.001, 0.05], ids=["weak", "strong"])
+@pytest.mark.parametrize("damping", DAMPING)
 def test_second_order_with_damping(damping):
     """Of a bar that is pushed by its massless end, by a force that grows smoothly."""
 
@@ -107,7 +110,7 @@ def test_second_order_with_damping(damping):
     assert errors[1] < 2e-3 * np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("damping", [0.001, 0.05], ids=["weak", "strong"])
+@pytest.mark.parametrize("damping", DAMPING)
 def test_second_order_with_damping_from_the_first_step_on(damping):
     """A sudden load: the first step, in which massless nodes have no earlier one, has the order of all others."""
 

@@ -80,7 +80,12 @@ def widen(order, cell, n):
     return structure.layout.size, *errors, np.sqrt(np.mean((found / pressure - 1.0) ** 2)), info.iterations
 
 
-KINDS = [(1, "quad"), (1, "tri"), (2, "quad"), (2, "tri")]
+KINDS = [
+    (1, "quad"),
+    pytest.param(1, "tri", marks=pytest.mark.slow),
+    pytest.param(2, "quad", marks=pytest.mark.slow),
+    (2, "tri"),
+]
 
 
 @pytest.mark.parametrize(("order", "cell"), KINDS)

@@ -133,7 +133,7 @@ def test_a_cycle_follows_the_matrix_that_multiplies():
     assert np.array_equal(*found)
 
 
-@pytest.mark.parametrize("cells", [16, 24])
+@pytest.mark.parametrize("cells", [16, pytest.param(24, marks=pytest.mark.slow)])
 def test_steady_flow_with_convection_takes_few_iterations(cells, monkeypatch):
     """To 1e-8 in each system of Newton's method, at Reynolds number 200, without solves in vain. It was up to 200."""
     monkeypatch.setattr(newton, "ENOUGH", 0.0)

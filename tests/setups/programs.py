@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from standing import COUNT, StandingProcesses
+
 from fsci.running.copied_process import exit_code, import_common, run_in_copy
 from fsci.running.copied_process import fsci as fsci_here
 
@@ -30,17 +32,25 @@ PARALLEL = {**ENVIRONMENT, "OMPI_MCA_mpi_yield_when_idle": "1"}
 DRAWING = ("plot", "report", "preview")
 
 
+STANDING = StandingProcesses({**PARALLEL, "PYTHONPATH": str(Path(__file__).parent)})
+
+
 def command(*arguments, processes: int = 1) -> list[str]:
     launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
     return [*launcher, sys.executable, "-m", "fsci", *map(str, arguments)]
 
 
 def fsci(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
-    """Run `fsci` to its end, on one process in a copy of this one, without its start and imports; see `new_process`."""
-    if processes > 1 or str(arguments[0]) in DRAWING:
-        return new_process(*arguments, processes=processes, timeout=timeout)
+    """Run `fsci` to its end, without its start and imports: on one process in a copy of this one, on two in those that
+    stand by; see `new_process`.
+    """
+    words = [str(word) for word in arguments]
+    if words[0] in DRAWING or processes > COUNT:
+        return new_process(*words, processes=processes, timeout=timeout)
+    if processes == COUNT:
+        return STANDING.run("fsci", words, timeout)
     import_common()
-    return run_in_copy(fsci_here, [str(word) for word in arguments], ENVIRONMENT, timeout)
+    return run_in_copy(fsci_here, words, ENVIRONMENT, timeout)
 
 
 def new_process(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
@@ -99,6 +109,8 @@ def on_processes(processes: int, *program, timeout: float = 600.0) -> subprocess
     words = [str(word) for word in program]
     if processes == 1:
         done = run_in_copy(python_here, words, ENVIRONMENT, timeout)
+    elif processes == COUNT:
+        done = STANDING.run(words[0], words[1:], timeout)
     else:
         command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py", *words]
         environment = {**PARALLEL, "PYTHONPATH": str(Path(__file__).parent)}
