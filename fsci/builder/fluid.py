@@ -89,7 +89,10 @@ def _body_force(settings: FluidSection) -> tuple[Value, ...] | None:
 
 
 def _patches(settings: FluidSection) -> list[Patch]:
-    return [Patch(name, patch.on, patch.kind, patch.value, patch.where) for name, patch in settings.patches.items()]
+    return [
+        Patch(name, patch.on, patch.kind, patch.value, patch.where, patch.outlet)
+        for name, patch in settings.patches.items()
+    ]
 
 
 # ---------------------------------------------------------------------------------------------------------- bodies
@@ -148,6 +151,10 @@ def _on_patch(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return probes.on_patch(forces.fluid, settings.quantity, settings.on or settings.through or "")
 
 
+def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    return probes.of_outlet(forces.fluid, case.probes[name].through or "")
+
+
 def _extreme(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return extreme_pressure(forces.fluid, case.probes[name].extreme or "largest")
 
@@ -173,6 +180,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", "at"): _at,
     ("pressure", "on"): _on_patch,
     ("flow_rate", "through"): _on_patch,
+    ("outlet_pressure", "through"): _of_outlet,
     ("pressure", ""): _extreme,
     ("force", ""): _force,
     ("moment", ""): _force,

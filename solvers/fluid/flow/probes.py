@@ -21,6 +21,7 @@ from solvers.fluid.mesh.space import FlowNodes
 from solvers.fluid.surfaces.inside import INSIDE, require_outside, winding
 from solvers.fluid.terms import forms
 from solvers.fluid.terms.boundary.covered_faces import CoveredFaces, covered_faces
+from solvers.fluid.terms.boundary.patches import outlet_laws
 from solvers.mesh.lagrange import lagrange
 
 Probe = Callable[[], dict[str, float]]
@@ -154,6 +155,12 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
         return {"": total / size if size else float("nan")}
 
     return probe
+
+
+def of_outlet(fluid: Fluid, patch: str) -> Probe:
+    """Probe of the pressure [Pa] that the law of an outlet gives for its flow rate (collective)."""
+    number = list(outlet_laws(fluid.patches)).index(patch)
+    return lambda: {"": float(fluid.system.outlets.pressures(fluid.iterate.values())[number])}
 
 
 class FlowRate(Protocol):

@@ -27,11 +27,13 @@ from solvers.fluid.mesh.space import Unknowns, set_velocity
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.solve.hanging_system import HangingSystem
+from solvers.fluid.solve.outlet_terms import OutletTerms
 from solvers.fluid.solve.tangent_matrix import TangentMatrix
 from solvers.fluid.surfaces.surface import ImmersedSurface, by_facets, may_close, seeping
 from solvers.fluid.terms import nitsche
 from solvers.fluid.terms.boundary.outer_faces import OuterFaces, OuterOnCut
-from solvers.fluid.terms.boundary.patches import Boundary
+from solvers.fluid.terms.boundary.patches import Boundary, outlet_laws
+from solvers.fluid.terms.boundary.windkessel import Outlets
 from solvers.fluid.terms.cell_forms import cell_forms, coefficients
 from solvers.fluid.terms.closed_contact.zone import ClosedZone, find_zone
 from solvers.fluid.terms.closed_contact.zone_entries import with_zone
@@ -89,6 +91,7 @@ class FlowSystem:
         self._residuals: list = []
         self._tangents: list = []
         self._outer_on_cut = OuterOnCut()
+        self.outlets = OutletTerms(unknowns, Outlets(outlet_laws(boundary.patches)).lines)
         self.speed = np.zeros(len(grid.numbers))  #: largest |a| at the nodes of each local cell [m/s]
         self.fastest = 0.0  #: largest |a| of all cells [m/s]
         self.active_dofs = np.zeros(unknowns.local, dtype=bool)  #: dofs of active cells
@@ -182,6 +185,7 @@ class FlowSystem:
             for integrals in (self.forms.residuals, self.forms.tangents)
         )
         self._outer_on_cut = self._outer.on_cut(cut, active)
+        self.outlets.set(self._outer_on_cut.fluxes)
         self._tangents += self._outer_on_cut.tangents
         if self._hanging is not None:
             self._tangents[0] = self._hanging.set_cells(self.cells[0], self._outer_on_cut.hanging)
@@ -358,16 +362,17 @@ class FlowSystem:
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
-        rows = self._out[:owned]
+        rows, flow, penalty = self._out[:owned], self.flow.x.array[:owned], self.matrix.penalty
         if self._hanging is not None:
             rows = self._hanging.table.rows(rows)
-        penalty = self.matrix.penalty
-        return rows.copy() if penalty is None else rows + penalty.times(self.flow.x.array[:owned])
+        rows = rows + self.outlets.rows(flow)
+        return rows if penalty is None else rows + penalty.times(flow)
 
     def tangent(self, identity: NDArray[np.bool_], *, picard: bool) -> PETSc.Mat:
-        """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
+        """d(residual)/d(flow) without `outlets.product`; the next call overwrites it.
 
-        picard: u . grad u is linearised without its second term, about the velocity of `set_scales`.
+        identity: owned dofs with such rows; picard: u . grad u is linearised without its second term, about the
+        velocity of `set_scales`.
         """
         self._follow()
         self._newton.value = 0.0 if picard else 1.0
@@ -480,6 +485,8 @@ class FlowSystem:
         for form in self._outer_on_cut.residuals:
             fem.assemble_vector(form, out)
         self._add_covered(out)
+        owned = self.unknowns.owned
+        out[:owned] += self.outlets.rows(self.flow.x.array[:owned])
         return out
 
     def _add_covered(self, out: Array) -> None:

@@ -98,7 +98,11 @@ def _dot(a: Expr, b: Expr) -> Expr:
     return ufl.dot(a, b)
 
 
-#: By their names in `Patch` and in the case file.
+_OUTFLOW = PatchKind(
+    open=True, form=_outflow, depends_on_flow=True,
+    slope=lambda faces, mu, mass_flux, values: faces.outflow(mu, mass_flux),
+)  # fmt: skip
+#: By their names in `Patch` and in the case file. The pressure of resistance and windkessel is in `outlet_terms`.
 PATCH_KINDS: Mapping[str, PatchKind] = {
     "velocity": PatchKind("all", value="velocity"),
     "no_slip": PatchKind("all"),
@@ -110,9 +114,8 @@ PATCH_KINDS: Mapping[str, PatchKind] = {
         "tangential", value="number", open=True, form=_pressure,
         stress=lambda faces, p: -faces.along_normal(p[:, :, 0]),
     ),
-    "outflow": PatchKind(
-        open=True, form=_outflow, depends_on_flow=True,
-        slope=lambda faces, mu, mass_flux, values: faces.outflow(mu, mass_flux),
-    ),
+    "outflow": _OUTFLOW,
+    "resistance": _OUTFLOW,
+    "windkessel": _OUTFLOW,
     "periodic": PatchKind(periodic=True),
 }  # fmt: skip
