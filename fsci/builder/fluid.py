@@ -64,9 +64,13 @@ def _grid(case: Case, comm: MPI.Comm) -> Grid:
 
 
 def _flow(settings: FluidSection) -> FlowSettings:
+    viscosity, shear = settings.viscosity, None
+    if settings.shear is not None:
+        viscosity, shear = settings.shear.of(viscosity)
     return FlowSettings(
         density=settings.density,
-        viscosity=settings.viscosity,
+        viscosity=viscosity,
+        shear=shear,
         element=settings.element,
         convection=settings.flow == "navier_stokes",
         scheme=settings.scheme,

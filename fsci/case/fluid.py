@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from fsci.case.errors import listed
 from fsci.case.free_body import Free, RigidDynamics
@@ -26,7 +26,9 @@ from fsci.case.values import (
     TimeFormula,
     TimeVector,
     Vector,
+    chosen,
 )
+from solvers.fluid.settings.shear_law import ShearLaw
 from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
 from solvers.fluid.terms.boundary.windkessel import Windkessel
 
@@ -197,11 +199,44 @@ class RigidBodySection(Section):
         return self
 
 
+class CarreauSection(Section):
+    """mu = infinite + (viscosity - infinite) (1 + (time rate)^2)^((exponent - 1)/2), rate^2 = 2 eps(u):eps(u)."""
+
+    law: Literal["carreau"] = setting(..., "how the viscosity depends on the shear rate")
+    infinite: NotNegative = setting(..., "viscosity at high rates", unit="Pa s")
+    time: NotNegative = setting(..., "reciprocal of the rate from which on the viscosity changes", unit="s")
+    exponent: Positive = setting(..., "below 1: the fluid becomes thinner with the rate", unit="1")
+
+    def of(self, viscosity: float) -> tuple[float, ShearLaw]:
+        """(viscosity at rest [Pa s], law) with the given `viscosity`."""
+        return viscosity, ShearLaw(self.infinite, self.time, self.exponent)
+
+
+class PowerLawSection(Section):
+    """mu = viscosity rate^(exponent - 1) with the rate in 1/s, rate^2 = 2 eps(u):eps(u) + least_rate^2."""
+
+    law: Literal["power_law"] = setting(..., "how the viscosity depends on the shear rate")
+    exponent: Positive = setting(..., "below 1: the fluid becomes thinner with the rate", unit="1")
+    least_rate: Positive = setting(..., "rate below which the viscosity hardly changes, small in the flow", unit="1/s")
+
+    def of(self, viscosity: float) -> tuple[float, ShearLaw]:
+        """(viscosity at rest [Pa s], law) with the given `viscosity`, that at the rate 1/s."""
+        return viscosity * self.least_rate ** (self.exponent - 1.0), ShearLaw(0.0, 1.0 / self.least_rate, self.exponent)
+
+
+ShearSection = Annotated[
+    CarreauSection | PowerLawSection, Field(discriminator="law"), chosen("law", ("carreau", "power_law"))
+]
+
+
 class FluidSection(Section):
     """Incompressible flow in a box around bodies that cut its grid."""
 
     density: Positive = setting(..., "mass per volume", unit="kg/m^3")
     viscosity: Positive = setting(..., "dynamic viscosity", unit="Pa s")
+    shear: ShearSection | None = setting(
+        None, "how the viscosity depends on the shear rate; default: it is constant. Not yet with bodies in the flow"
+    )
     flow: Literal["navier_stokes", "stokes"] = setting(
         "navier_stokes", "stokes: creeping flow, without the convective term"
     )

@@ -34,6 +34,24 @@ MISTAKES = [
     ("probes:", "contact: {pairs: {}}\nprobes:", "15:10: 'contact' needs the section 'structure'", "{pairs"),
     ("  density: 1.2\n", "", "3:1: missing setting 'density' in 'fluid'", "fluid"),
     ("density: 1.2", "density: -1", "4:12: 'density' must be greater than 0, not -1", "-1"),
+    (
+        "density: 1.2",
+        "density: 1\n  shear: {law: carreau, infinite: 0, time: 1, exponent: 0.5}",
+        "5:10: with bodies in the flow the viscosity must be constant",
+        "{law",
+    ),
+    (
+        "density: 1.2",
+        "density: 1\n  shear: {law: cross}",
+        "5:16: unknown law 'cross' (available: carreau, power_law)",
+        "cross",
+    ),
+    (
+        "density: 1.2",
+        "density: 1\n  shear: {law: power_law, exponent: 0.5}",
+        "5:3: missing setting 'least_rate' in 'shear'",
+        "shear",
+    ),
     ("density: 1.2", "density: 1\n  scheme: bdf3", "5:11: 'scheme' must be", "bdf3"),
     (
         "density: 1.2",

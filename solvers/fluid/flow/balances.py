@@ -55,7 +55,7 @@ class Balances:
         self.system = system
         u = system.unknowns.parts(system.flow)[0]
         v = system.unknowns.parts(ufl.TestFunction(system.unknowns.space))[0]
-        strain = 2.0 * system.terms.mu * ufl.inner(forms.eps(u), forms.eps(v))
+        strain = ufl.inner(forms.viscous_stress(system.terms, u), forms.eps(v))
         everywhere, in_film = (
             ufl.dot(forms.inertia(flow, u), v) + strain for flow in (system.terms, forms.creeping(system.terms))
         )

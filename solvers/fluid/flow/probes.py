@@ -292,10 +292,10 @@ def of_fluid(fluid: Fluid, quantity: str) -> Probe:
     def integrals() -> list[fem.Integral]:
         settings, domain, degree = fluid.settings, fluid.grid.domain, fluid.unknowns.degree
         u, weights = fluid.unknowns.parts(fluid.system.flow)[0], fluid.system.weights
-        density, viscosity = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
+        density = fem.constant(domain, settings.density)
         density_of = {
             "kinetic_energy": 0.5 * density * ufl.dot(u, u),
-            "dissipation": 2.0 * viscosity * ufl.inner(forms.eps(u), forms.eps(u)),
+            "dissipation": ufl.inner(forms.viscous_stress(fluid.system.terms, u), forms.eps(u)),
         }[quantity]
         parts = [fem.Integral(domain, density_of * fem.measure(domain, "dx", 2 * degree))]
         if fluid.bodies:

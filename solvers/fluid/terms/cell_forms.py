@@ -46,7 +46,15 @@ def coefficients(
         steady=settings.steady,
         degree=settings.degree,
         mesh=domain.mesh.ufl_domain(),
+        shear=_shear(domain, settings),
     )
+
+
+def _shear(domain: fem.Domain, settings: FlowSettings) -> tuple[Any, Any, Any] | None:
+    """Constants of the law of shear, so that all flows share their compiled forms; None: there is none."""
+    if (law := settings.shear) is None:
+        return None
+    return fem.constant(domain, law.infinite), fem.constant(domain, law.time), fem.constant(domain, law.exponent)
 
 
 def cell_forms(

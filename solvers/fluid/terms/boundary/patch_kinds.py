@@ -44,7 +44,7 @@ class PatchKind:
     periodic: bool = False
     #: (flow, u, value, n, v) -> integrand of -<t, v>; a number comes as such
     form: Callable[[Coefficients, Expr, Expr, Expr, Expr], Expr] | None = None
-    depends_on_flow: bool = False  #: the form has u, and is linear in it
+    depends_on_flow: bool = False  #: the form has u; where bodies cover a face, linearly
     #: The same for faces that bodies cover in part, at points of the wet part:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
     stress: Callable[[PartlyCoveredFaces, Array], Array] | None = None
@@ -69,7 +69,7 @@ def _pressure(flow: Coefficients, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
 
 def _slip_length(flow: Coefficients, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr:
     """<mu/b u, v>: the shear stress is -mu/b times the tangential velocity; the normal one is prescribed as zero."""
-    return flow.mu / b * _dot(u, v)
+    return flow.viscosity(u) / b * _dot(u, v)
 
 
 def _slip_slope(faces: PartlyCoveredFaces, mu: float, mass_flux: Array, b: Array | None) -> Array:
@@ -85,7 +85,7 @@ def _outflow(flow: Coefficients, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr
     """
     import ufl
 
-    terms = -flow.mu * _dot(_dot(n, ufl.grad(u)), v)
+    terms = -flow.viscosity(u) * _dot(_dot(n, ufl.grad(u)), v)
     if flow.convection:
         back = 0.5 * (_dot(flow.a, n) - abs(_dot(flow.a, n)))
         terms -= 0.5 * flow.rho * back * _dot(u, v)
