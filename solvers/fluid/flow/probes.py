@@ -7,7 +7,7 @@ all extensive quantities are per depth.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import ufl
@@ -293,13 +293,15 @@ def of_fluid(fluid: Fluid, quantity: str) -> Probe:
         settings, domain, degree = fluid.settings, fluid.grid.domain, fluid.unknowns.degree
         u, weights = fluid.unknowns.parts(fluid.system.flow)[0], fluid.system.weights
         density = fem.constant(domain, settings.density)
-        density_of = {
-            "kinetic_energy": 0.5 * density * ufl.dot(u, u),
-            "dissipation": ufl.inner(forms.viscous_stress(fluid.system.terms, u), forms.eps(u)),
-        }[quantity]
-        parts = [fem.Integral(domain, density_of * fem.measure(domain, "dx", 2 * degree))]
+
+        def density_of(flow: forms.Coefficients) -> Any:
+            if quantity == "kinetic_energy":
+                return 0.5 * density * ufl.dot(u, u)
+            return ufl.inner(forms.viscous_stress(flow, u), forms.eps(u))
+
+        parts = [fem.Integral(domain, density_of(fluid.system.terms) * fem.measure(domain, "dx", 2 * degree))]
         if fluid.bodies:
-            on_cut = weights.fluid * density_of * fem.measure(domain, "dx", weights.degree)
+            on_cut = weights.fluid * density_of(fluid.system.on_cut) * fem.measure(domain, "dx", weights.degree)
             parts.append(fem.Integral(domain, on_cut))
         return parts
 

@@ -26,6 +26,7 @@ from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.space import Unknowns, set_velocity
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.time_scheme import FlowStep
+from solvers.fluid.solve.cell_viscosity import CellViscosity
 from solvers.fluid.solve.hanging_system import HangingSystem
 from solvers.fluid.solve.outlet_terms import OutletTerms
 from solvers.fluid.solve.tangent_matrix import TangentMatrix
@@ -71,14 +72,16 @@ class FlowSystem:
         self.weights = Weights(grid, settings.degree)
         parts = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
         self.terms = coefficients(domain, settings, *parts, alpha=(self._alpha, self._scale_alpha), newton=self._newton)
+        self.viscosity = CellViscosity(unknowns, settings)
+        self.on_cut = self.viscosity.on_cut(self.terms)  #: coefficients in cut cells
         #: gaps of a few cells, with first-order velocities
-        self.gaps = (
-            GapTerms(grid, settings.viscosity, settings.density) if with_bodies and settings.degree == 1 else None
-        )
-        with_gaps = self.terms, settings.penalties, self.gaps
-        self.cut_penalty = choose_cut_penalty(unknowns, *with_gaps) if with_bodies else None
+        with_gaps = with_bodies and settings.degree == 1
+        self.gaps = GapTerms(grid, settings.viscosity, settings.density) if with_gaps else None
+        on_faces = self.viscosity.on_faces(self.terms), settings.penalties, self.gaps
+        self.cut_penalty = choose_cut_penalty(unknowns, *on_faces) if with_bodies else None
         of_gaps = None if self.gaps is None else self.gaps.scales
-        self.forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None, of_gaps)
+        of_cut = self.weights if with_bodies else None
+        self.forms = cell_forms(unknowns, self.terms, self.flow, of_cut, of_gaps, on_cut=self.on_cut)
         self._hanging = (
             None if unknowns.hanging is None else HangingSystem(unknowns, unknowns.hanging, self.forms.tangents[0])
         )
@@ -259,7 +262,8 @@ class FlowSystem:
 
     def _follow(self) -> None:
         """Update weights, interface and cut penalty to the present cut and scales (collective)."""
-        if self._current:
+        changed = self.with_bodies and self.viscosity.update(self.flow.x.array)
+        if self._current and not changed:
             return
         assert self.cut is not None
         cut = self.cut
@@ -271,7 +275,7 @@ class FlowSystem:
                 self.unknowns,
                 self.weights,
                 cut,
-                self.settings.viscosity,
+                self.viscosity.of(cut.cut[cut.pieces.cell]),
                 penalty,
                 self.slip_length,
                 self.transmissivity,
@@ -317,7 +321,7 @@ class FlowSystem:
         """P of pieces [Pa s/m], shape (pieces, dim, dim)."""
         settings, cells = self.settings, cut.cut[pieces.cell]
         g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
-        flow = settings.viscosity, settings.density, float(self._alpha.value)
+        flow = self.viscosity.of(cells), settings.density, float(self._alpha.value)
         speeds, sizes = (self.speed[cells], g * settings.convection), self.grid.sizes[cells]
         reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
         least: Array | float = 0.0
@@ -485,13 +489,12 @@ class FlowSystem:
         for form in self._outer_on_cut.residuals:
             fem.assemble_vector(form, out)
         self._add_covered(out)
-        owned = self.unknowns.owned
-        out[:owned] += self.outlets.rows(self.flow.x.array[:owned])
+        out[: self.unknowns.owned] += self.outlets.rows(self.flow.x.array[: self.unknowns.owned])
         return out
 
     def _add_covered(self, out: Array) -> None:
         self._outer.add_covered(self._outer_on_cut, out, self.flow.x.array, *self._outer_scales())
 
-    def _outer_scales(self) -> tuple[float, float, Array]:
-        settings = self.settings
-        return settings.viscosity, settings.density if settings.convection else 0.0, self._scale_velocity.x.array
+    def _outer_scales(self) -> tuple[float | Array, float, Array]:
+        density = self.settings.density if self.settings.convection else 0.0
+        return self.viscosity.of(np.arange(len(self.grid.sizes))), density, self._scale_velocity.x.array

@@ -161,7 +161,7 @@ class OuterFaces:
             np.add.at(found, dofs, load)
         return found
 
-    def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
+    def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float | Array, rho: float, a: Array) -> None:
         """Add the residual over the wet part of covered faces to local dofs; for mu, rho, a see `slopes`."""
         for term, part in on_cut.covered:
             if term.kind.stress is not None and term.value is not None:
@@ -170,15 +170,20 @@ class OuterFaces:
         for dofs, block in self.slopes(on_cut, mu, rho, a):
             np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, flow[dofs]))
 
-    def slopes(self, on_cut: OuterOnCut, mu: float, rho: float, a: Array) -> Iterator[tuple[NDArray[np.int32], Array]]:
+    def slopes(
+        self, on_cut: OuterOnCut, mu: float | Array, rho: float, a: Array
+    ) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """(local dofs, derivatives by the flow) of terms with u over the wet part of covered faces.
 
-        mu [Pa s]; rho [kg/m^3], zero without convection; a [m/s]: velocity of the step before, at local dofs.
+        mu [Pa s] (by local cells if it varies); rho [kg/m^3], zero without convection; a [m/s]: velocity of the
+        step before, at local dofs.
         """
         for term, part in on_cut.covered:
             if term.kind.slope is not None:
                 values = None if term.value is None else part.velocity(term.value.x.array)
-                yield self.unknowns.cell_velocity[part.cells], term.kind.slope(part, mu, rho * part.velocity(a), values)
+                viscosity = mu if isinstance(mu, float) else mu[part.cells, None]
+                slope = term.kind.slope(part, viscosity, rho * part.velocity(a), values)
+                yield self.unknowns.cell_velocity[part.cells], slope
 
 
 def _hydrostatic(body_force: Sequence[Value], middle: Array) -> Value:

@@ -25,7 +25,7 @@ class PartlyCoveredFaces(Protocol):
         """Vectors of given lengths along the outward normal."""
         ...
 
-    def outflow(self, mu: float, mass_flux: Array) -> Array:
+    def outflow(self, mu: float | Array, mass_flux: Array) -> Array:
         """d/du of the form of an outflow."""
         ...
 
@@ -48,8 +48,9 @@ class PatchKind:
     #: The same for faces that bodies cover in part, at points of the wet part:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
     stress: Callable[[PartlyCoveredFaces, Array], Array] | None = None
-    #: (faces, mu, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before; for forms with u
-    slope: Callable[[PartlyCoveredFaces, float, Array, Array | None], Array] | None = None
+    #: (faces, mu, or (cells, 1) of it, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before;
+    #: for forms with u
+    slope: Callable[[PartlyCoveredFaces, float | Array, Array, Array | None], Array] | None = None
 
     @property
     def normal_given(self) -> bool:
@@ -72,7 +73,7 @@ def _slip_length(flow: Coefficients, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr
     return flow.viscosity(u) / b * _dot(u, v)
 
 
-def _slip_slope(faces: PartlyCoveredFaces, mu: float, mass_flux: Array, b: Array | None) -> Array:
+def _slip_slope(faces: PartlyCoveredFaces, mu: float | Array, mass_flux: Array, b: Array | None) -> Array:
     assert b is not None
     return faces.friction(mu / b[:, :, 0])
 
