@@ -23,7 +23,8 @@ class Blocks:
     into_solid: PETSc.Mat
     into_flow: PETSc.Mat
     flow: PETSc.Mat
-    added: Callable[[Array], Array] | None = None  #: a part of low rank of `solid`, as a product with its unknowns
+    #: parts of low rank of `solid` and of `flow`, as products with their unknowns
+    added: tuple[Callable[[Array], Array] | None, Callable[[Array], Array] | None] = (None, None)
 
     def create_vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         """Two vectors; each process has the rows of the solid, then those of the flow."""
@@ -55,13 +56,14 @@ class Blocks:
         return matrix_of(TwoFields(blocks, numbering.first, numbering.second, flow))
 
     def with_added(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """The matrix of all blocks with the part of low rank."""
-        own, added = self.solid.getLocalSize()[0], self.added
-        if added is None:
+        """The matrix of all blocks with the parts of low rank."""
+        own = self.solid.getLocalSize()[0]
+        if self.added == (None, None):
             return matrix
 
         def product(x: Array) -> Array:
-            return np.concatenate([added(x[:own]), np.zeros(len(x) - own)])
+            parts = zip(self.added, (x[:own], x[own:]), strict=True)
+            return np.concatenate([np.zeros(len(part)) if added is None else added(part) for added, part in parts])
 
         return with_product(matrix, product)
 

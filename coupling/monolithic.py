@@ -271,7 +271,8 @@ class Monolithic:
             solid.add_rounding(rounding_error(into_solid, flow.rounded()))
             solid.add_rounding(rounding_error(mass, solid.rounded()))
             self._linearised = True
-            return Blocks(K, into_solid, into_flow, A, solid.added_product())
+            added = solid.added_product(), flow.added_product()
+            return Blocks(K, into_solid, into_flow, A, added)
 
     def _derivatives_of_flow(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """The tangent of the flow and the coupling blocks at the present iterate."""

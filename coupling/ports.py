@@ -239,6 +239,10 @@ class Flow(Part, Protocol):
         """Whether the present cut has films that are thinner than a cell (collective)."""
         ...
 
+    def added_product(self) -> Callable[[Array], Array] | None:
+        """The part of its derivative that `linearise` lacks, as a product with its unknowns; None: nothing."""
+        ...
+
     def keeps_tangent(self) -> bool:
         """Whether the last tangent may serve for this iterate: it holds the same unknowns (collective)."""
         ...

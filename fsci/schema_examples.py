@@ -86,6 +86,9 @@ EXAMPLES = {
     "Refinement": "refine: [{around: cylinder, level: 2}, {box: [[0.25, 0.1], [0.6, 0.3]], level: 1}]",
     "Patch": 'patches:\n  in: {on: x-, velocity: ["1 - y^2", 0]}\n  outlet: {on: x+, where: "y - 0.5", outflow: true}'
     "\n  walls: {on: [y-, y+], no_slip: true}",
+    "Windkessel": "windkessel: {proximal: 1e7, capacitance: 1e-9, distal: 1e8}",
+    "Carreau": "shear: {law: carreau, infinite: 0.00345, time: 3.313, exponent: 0.3568}",
+    "PowerLaw": "shear: {law: power_law, exponent: 0.6, least_rate: 1e-3}",
     "RigidBody": "bodies:\n  cylinder: {mesh: {shape: disc, radius: 0.05, cells: [120, 1], translate: [0.2, 0.2]}}",
     "Movement": 'motion: {displacement: [0, "0.02*sin(2*pi*t)"]}',
     "Turn": 'rotation: {centre: [0.2, 0.2], angle: "30*sin(2*pi*t)"}',

@@ -64,9 +64,13 @@ def _grid(case: Case, comm: MPI.Comm) -> Grid:
 
 
 def _flow(settings: FluidSection) -> FlowSettings:
+    viscosity, shear = settings.viscosity, None
+    if settings.shear is not None:
+        viscosity, shear = settings.shear.of(viscosity)
     return FlowSettings(
         density=settings.density,
-        viscosity=settings.viscosity,
+        viscosity=viscosity,
+        shear=shear,
         element=settings.element,
         convection=settings.flow == "navier_stokes",
         scheme=settings.scheme,
@@ -89,7 +93,10 @@ def _body_force(settings: FluidSection) -> tuple[Value, ...] | None:
 
 
 def _patches(settings: FluidSection) -> list[Patch]:
-    return [Patch(name, patch.on, patch.kind, patch.value, patch.where) for name, patch in settings.patches.items()]
+    return [
+        Patch(name, patch.on, patch.kind, patch.value, patch.where, patch.outlet)
+        for name, patch in settings.patches.items()
+    ]
 
 
 # ---------------------------------------------------------------------------------------------------------- bodies
@@ -148,6 +155,10 @@ def _on_patch(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return probes.on_patch(forces.fluid, settings.quantity, settings.on or settings.through or "")
 
 
+def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    return probes.of_outlet(forces.fluid, case.probes[name].through or "")
+
+
 def _extreme(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return extreme_pressure(forces.fluid, case.probes[name].extreme or "largest")
 
@@ -173,6 +184,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", "at"): _at,
     ("pressure", "on"): _on_patch,
     ("flow_rate", "through"): _on_patch,
+    ("outlet_pressure", "through"): _of_outlet,
     ("pressure", ""): _extreme,
     ("force", ""): _force,
     ("moment", ""): _force,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from fsci.case.errors import listed
 from fsci.case.free_body import Free, RigidDynamics
@@ -26,11 +26,26 @@ from fsci.case.values import (
     TimeFormula,
     TimeVector,
     Vector,
+    chosen,
 )
+from solvers.fluid.settings.shear_law import ShearLaw
 from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
+from solvers.fluid.terms.boundary.windkessel import Windkessel
 
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 KINDS_OF_PATCH = tuple(PATCH_KINDS)
+
+
+class WindkesselSection(Section):
+    """Pressure P = proximal q + P_c of an outlet with the flow rate q, capacitance dP_c/dt = q - P_c / distal.
+
+    In 2D the flow rate is per depth, hence the units are Pa s/m^2 and m^2/Pa.
+    """
+
+    proximal: NotNegative = setting(..., "resistance next to the outlet", unit="Pa s/m^3")
+    capacitance: NotNegative = setting(..., "volume stored per pressure behind it", unit="m^3/Pa")
+    distal: NotNegative = setting(..., "resistance through which the stored volume leaves", unit="Pa s/m^3")
+    initial_pressure: Number = setting(0.0, "P_c at the start", unit="Pa")
 
 
 class PatchSection(Section):
@@ -57,6 +72,12 @@ class PatchSection(Section):
     outflow: Switch = setting(
         False, "true: the flow leaves at pressure 0, without disturbance if it is parallel: mu du/dn - p n = 0"
     )
+    resistance: NotNegative | None = setting(
+        None, "outflow at the pressure resistance times flow rate; in 2D Pa s/m^2, the rate per depth", unit="Pa s/m^3"
+    )
+    windkessel: WindkesselSection | None = setting(
+        None, "outflow at the pressure of a Windkessel of three elements, R_p in series with C and R_d in parallel"
+    )
     periodic: Switch = setting(
         False,
         "true: the flow is periodic between two opposite faces; 'on' names both, and the patch covers all of them",
@@ -64,7 +85,7 @@ class PatchSection(Section):
 
     @model_validator(mode="after")
     def _one_kind(self) -> PatchSection:
-        given = [kind for kind in KINDS_OF_PATCH if getattr(self, kind) not in (None, False)]
+        given = self._given()
         words = listed(KINDS_OF_PATCH)
         if not given:
             raise fault(f"a patch needs one of {words}")
@@ -85,13 +106,25 @@ class PatchSection(Section):
     @property
     def kind(self) -> str:
         """The name of its condition in `PATCH_KINDS`."""
-        return next(kind for kind in KINDS_OF_PATCH if getattr(self, kind) not in (None, False))
+        return self._given()[0]
+
+    def _given(self) -> list[str]:
+        return [kind for kind in KINDS_OF_PATCH if getattr(self, kind) is not None and getattr(self, kind) is not False]
 
     @property
     def value(self) -> tuple[Any, ...] | None:
         """The given value, by components."""
         value = getattr(self, self.kind) if PATCH_KINDS[self.kind].value else None
         return value if value is None or isinstance(value, tuple) else (value,)
+
+    @property
+    def outlet(self) -> Windkessel | None:
+        """The law of its pressure; None: there is none."""
+        if self.resistance is not None:
+            return Windkessel(self.resistance)
+        if (w := self.windkessel) is None:
+            return None
+        return Windkessel(w.proximal, w.distal, w.capacitance, w.initial_pressure)
 
     @property
     def open(self) -> bool:
@@ -166,11 +199,44 @@ class RigidBodySection(Section):
         return self
 
 
+class CarreauSection(Section):
+    """mu = infinite + (viscosity - infinite) (1 + (time rate)^2)^((exponent - 1)/2), rate^2 = 2 eps(u):eps(u)."""
+
+    law: Literal["carreau"] = setting(..., "how the viscosity depends on the shear rate")
+    infinite: NotNegative = setting(..., "viscosity at high rates", unit="Pa s")
+    time: NotNegative = setting(..., "reciprocal of the rate from which on the viscosity changes", unit="s")
+    exponent: Positive = setting(..., "below 1: the fluid becomes thinner with the rate", unit="1")
+
+    def of(self, viscosity: float) -> tuple[float, ShearLaw]:
+        """(viscosity at rest [Pa s], law) with the given `viscosity`."""
+        return viscosity, ShearLaw(self.infinite, self.time, self.exponent)
+
+
+class PowerLawSection(Section):
+    """mu = viscosity rate^(exponent - 1) with the rate in 1/s, rate^2 = 2 eps(u):eps(u) + least_rate^2."""
+
+    law: Literal["power_law"] = setting(..., "how the viscosity depends on the shear rate")
+    exponent: Positive = setting(..., "below 1: the fluid becomes thinner with the rate", unit="1")
+    least_rate: Positive = setting(..., "rate below which the viscosity hardly changes, small in the flow", unit="1/s")
+
+    def of(self, viscosity: float) -> tuple[float, ShearLaw]:
+        """(viscosity at rest [Pa s], law) with the given `viscosity`, that at the rate 1/s."""
+        return viscosity * self.least_rate ** (self.exponent - 1.0), ShearLaw(0.0, 1.0 / self.least_rate, self.exponent)
+
+
+ShearSection = Annotated[
+    CarreauSection | PowerLawSection, Field(discriminator="law"), chosen("law", ("carreau", "power_law"))
+]
+
+
 class FluidSection(Section):
     """Incompressible flow in a box around bodies that cut its grid."""
 
     density: Positive = setting(..., "mass per volume", unit="kg/m^3")
     viscosity: Positive = setting(..., "dynamic viscosity", unit="Pa s")
+    shear: ShearSection | None = setting(
+        None, "how the viscosity depends on the shear rate; default: it is constant; in flows without bodies"
+    )
     flow: Literal["navier_stokes", "stokes"] = setting(
         "navier_stokes", "stokes: creeping flow, without the convective term"
     )

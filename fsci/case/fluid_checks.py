@@ -21,6 +21,8 @@ def fluid_mistakes(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
     dimension = fluid.grid.dimension
     for name in ("gravity", "body_force", "initial_velocity"):
         yield from length_mistakes(getattr(fluid, name), dimension, ("fluid", name))
+    if fluid.shear is not None and fluid.narrow_gaps:
+        yield ("fluid", "narrow_gaps"), "is for a constant viscosity"
     yield from _patches(fluid)
     yield from _refinements(case, fluid)
     for name, body in fluid.bodies.items():

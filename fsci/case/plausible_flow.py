@@ -134,7 +134,9 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
 def _driven(fluid: FluidSection) -> bool:
     loads = (fluid.gravity, fluid.body_force, fluid.initial_velocity)
     moved = any(body.motion or body.free for body in fluid.bodies.values())
-    return any(loads) or moved or any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
+    charged = (p.windkessel and p.windkessel.initial_pressure for p in fluid.patches.values())
+    driven = any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
+    return any(loads) or moved or driven or any(charged)
 
 
 def _reynolds(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:

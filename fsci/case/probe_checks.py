@@ -106,6 +106,9 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
         patch = getattr(probe, place)
         if patch is not None and patch not in fluid.patches:
             yield (*keys, place), f"unknown patch '{patch}'{did_you_mean(patch, fluid.patches)}"
+    if probe.quantity == "outlet_pressure" and (through := fluid.patches.get(probe.through or "")):
+        if through.outlet is None:
+            yield (*keys, "through"), f"the patch '{probe.through}' is neither a 'resistance' nor a 'windkessel'"
     if probe.reference is not None:
         yield from _reference(probe.reference, grid.dimension, (*keys, "reference"))
     yield from length_mistakes(probe.about, grid.dimension, (*keys, "about"))

@@ -88,6 +88,7 @@ _QUANTITIES = (
     Quantity("volume", (3, 0, 0), "one", (WHOLE,), (WHOLE,)),
     Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass", rigid=(WHOLE,)),
     Quantity("flow_rate", (3, 0, -1), "one", (), ("through",), meaning="volume per time, out of the box"),
+    Quantity("outlet_pressure", _STRESS, "one", (), ("through",), meaning="of a `resistance` or `windkessel`"),
     Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),
     Quantity("drag_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),

@@ -54,7 +54,7 @@ def message(text: str, folder) -> str:
 def test_walls_all_round_a_steady_flow(tmp_path):
     said = message(COLUMN.replace(OPEN, CLOSED), tmp_path)
     assert "case.yaml:6:11: the boundary encloses the fluid, and a steady flow does not determine its pressure" in said
-    assert "take 'bdf2', or give a patch with 'traction', 'pressure' or 'outflow'" in said
+    assert "take 'bdf2', or give a patch with 'traction', 'pressure', 'outflow', 'resistance' or 'windkessel'" in said
 
 
 @pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])

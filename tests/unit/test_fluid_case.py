@@ -14,7 +14,10 @@ from fsci.check.check import summary
 
 ROUGH = Path(__file__).parents[2] / "cases/torus_rough/case.yaml"
 
-KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'slip_length', 'traction', 'pressure', 'outflow' or 'periodic'"
+KINDS = (
+    "'velocity', 'no_slip', 'slip', 'symmetry', 'slip_length', 'traction', 'pressure', 'outflow', 'resistance', "
+    "'windkessel' or 'periodic'"
+)
 FACES = "'x-', 'x+', 'y-', 'y+', 'z-' or 'z+'"
 
 #: what is replaced, by what, the message with line and column, the text that stands there
@@ -31,6 +34,24 @@ MISTAKES = [
     ("probes:", "contact: {pairs: {}}\nprobes:", "15:10: 'contact' needs the section 'structure'", "{pairs"),
     ("  density: 1.2\n", "", "3:1: missing setting 'density' in 'fluid'", "fluid"),
     ("density: 1.2", "density: -1", "4:12: 'density' must be greater than 0, not -1", "-1"),
+    (
+        "density: 1.2",
+        "density: 1\n  shear: {law: carreau, infinite: 0, time: 1, exponent: 0.5}",
+        "5:10: with bodies in the flow the viscosity must be constant",
+        "{law",
+    ),
+    (
+        "density: 1.2",
+        "density: 1\n  shear: {law: cross}",
+        "5:16: unknown law 'cross' (available: carreau, power_law)",
+        "cross",
+    ),
+    (
+        "density: 1.2",
+        "density: 1\n  shear: {law: power_law, exponent: 0.5}",
+        "5:3: missing setting 'least_rate' in 'shear'",
+        "shear",
+    ),
     ("density: 1.2", "density: 1\n  scheme: bdf3", "5:11: 'scheme' must be", "bdf3"),
     (
         "density: 1.2",
@@ -46,6 +67,26 @@ MISTAKES = [
     ("outflow: true", "slip_length: 0", "9:35: 'slip_length' must be greater than 0, not 0", "0"),
     ("[y-, y+]", "y-", "7:3: no patch is on the face 'y+' of the box", "patches"),
     ('["4*y*(1 - y)", 0]', "[1, 0, 0]", "8:31: 'velocity' must have 2 entries in 2D, not 3", "[1"),
+    ("outflow: true", "resistance: -1", "9:34: 'resistance' must be at least 0, not -1", "-1"),
+    (
+        "outflow: true",
+        "windkessel: {proximal: 1, capacitance: 2}",
+        "9:22: missing setting 'distal' in 'windkessel'",
+        "windkessel",
+    ),
+    (
+        "outflow: true",
+        "windkessel: {proximal: 1, compliance: 2, distal: 3}",
+        "9:48: unknown setting 'compliance'",
+        "compliance",
+    ),
+    ("outflow: true", "resistance: 0, pressure: 1", f"9:34: give only one of {KINDS}", "0"),
+    (
+        "quantity: flow_rate",
+        "quantity: outlet_pressure",
+        "19:45: the patch 'outlet' is neither a 'resistance' nor a 'windkessel'",
+        "outlet",
+    ),
     ("on: x-", "on: x-, where: y - t", "8:28: 'where' must not depend on t", "y - t"),
     ("outflow: true", "pressure: [1, 0]", "9:32: 'pressure' must be a number or an expression", "[1"),
     ("outflow: true", "periodic: true", "9:18: 'x+' is periodic with 'x-': put both into 'on'", "x+"),

@@ -55,11 +55,11 @@ class Balances:
         self.system = system
         u = system.unknowns.parts(system.flow)[0]
         v = system.unknowns.parts(ufl.TestFunction(system.unknowns.space))[0]
-        strain = 2.0 * system.terms.mu * ufl.inner(forms.eps(u), forms.eps(v))
-        everywhere, in_film = (
-            ufl.dot(forms.inertia(flow, u), v) + strain for flow in (system.terms, forms.creeping(system.terms))
+        everywhere, in_cut, in_film = (
+            ufl.dot(forms.inertia(flow, u), v) + ufl.inner(forms.viscous_stress(flow, u), forms.eps(v))
+            for flow in (system.terms, system.on_cut, forms.creeping(system.on_cut))
         )
-        self._inner = self._over_fluid(everywhere, in_film)
+        self._inner = self._over_fluid(everywhere, in_cut, in_film)
 
     def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float, float]:
         """(force [N] on all bodies together, (dim,); power [W] lost by the method, and that of walls and patches).
@@ -90,13 +90,13 @@ class Balances:
         rows[: len(owned)] += owned
         return rows
 
-    def _over_fluid(self, integrand, in_film) -> list[fem.Integral]:
-        """Integrals over uncut cells, over the fluid in cut cells, and of another integrand in films."""
+    def _over_fluid(self, integrand, in_cut, in_film) -> list[fem.Integral]:
+        """Integrals over uncut cells, over the fluid in cut cells, and in films."""
         system, domain, weights = self.system, self.system.grid.domain, self.system.weights
         parts = [fem.Integral(domain, integrand * fem.measure(domain, "dx", 2 * system.unknowns.degree + 1))]
         if system.with_bodies:
             dx_cut = fem.measure(domain, "dx", weights.degree)
-            parts += [fem.Integral(domain, weights.fluid * some * dx_cut) for some in (integrand, in_film)]
+            parts += [fem.Integral(domain, weights.fluid * some * dx_cut) for some in (in_cut, in_film)]
         return parts
 
     def _inner_rows(self) -> Array:

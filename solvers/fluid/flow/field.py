@@ -10,7 +10,7 @@ Newton's method) and `moving` (bodies and their motion).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -396,6 +396,10 @@ class Fluid:
         """The tangent at the present iterate; held rows are those of the identity. The next call overwrites it."""
         return self.iterate.linearise(picard=self._picard)
 
+    def added_product(self) -> Callable[[Array], Array] | None:
+        """The part of the tangent that couples all of an outlet, as a product with owned values; None: nothing."""
+        return self.iterate.added_product()
+
     def right_side(self) -> Array:
         """Right-hand side for the increment of owned dofs: minus the residual."""
         return -self.iterate.rows
@@ -480,10 +484,8 @@ class Fluid:
 
     def save(self) -> State:
         """The state that a next step starts from; whole arrays where cells may change, by process else (collective)."""
-        return everywhere(self.comm, self._by_process()) if self._cells_may_change else self._by_process()
-
-    def _by_process(self) -> State:
-        return self.on_cells.save() | self.moving.save() | {"time": self.current.t}
+        state = self.on_cells.save() | self.moving.save() | {"time": self.current.t}
+        return everywhere(self.comm, state) if self._cells_may_change else state
 
     def restore(self, state: State) -> None:
         """Restore a saved state (collective)."""

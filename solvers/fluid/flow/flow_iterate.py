@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,10 +111,16 @@ class FlowIterate:
         try:
             with self._timer("solve"):
                 near = self._system.dofs_near_surfaces
-                self.linear_iterations = solver.solve(matrix, b, x, self.held, near, reduction=reduction)
+                self.linear_iterations = solver.solve(
+                    matrix, b, x, self.held, near, added=self.added_product(), reduction=reduction
+                )
         except linear.LinearSolveFailed as failure:
             raise StepFailed("fluid", failure.kind, str(failure), where=self.worst()) from failure
         return x.array
+
+    def added_product(self) -> Callable[[Array], Array] | None:
+        """The part of low rank of the tangent, as a product with owned values; None: zero."""
+        return self._system.outlets.product(self.held)
 
     def multigrid(self, matrix: PETSc.Mat, product: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent, which it multiplies by `product`; the next call overwrites it."""

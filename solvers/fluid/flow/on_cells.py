@@ -25,7 +25,8 @@ from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.solve.linear_systems.krylov import FlowSolver, SolverSequence
 from solvers.fluid.surfaces.surface import Motion
-from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.boundary.patches import Patch, outlet_laws
+from solvers.fluid.terms.boundary.windkessel import Outlets
 from solvers.mesh.distributed import scatter
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
@@ -54,6 +55,7 @@ class FlowOnCells:
         )
         self._sequence = SolverSequence(comm, self.parts.methods, self.parts.unknowns.counted(), note)
         self.iterate = self._first_iterate()
+        self._outlets = Outlets(outlet_laws(patches))
         self.history = History(settings.time, self.parts.unknowns.local)
         self.prescribed_at = 0.0  #: time [s] of the velocities of the boundary
         self.renewals = 1  #: count of discretisations: one, and one for each change of cells
@@ -70,6 +72,7 @@ class FlowOnCells:
         self.parts = discretise(self._comm, self.box, sheets, settings, self._patches, self._bodies, self._solver)
         if gaps is not None and self.parts.system.gaps is not None:
             self.parts.system.gaps.memory = gaps.memory
+        self.parts.system.outlets.lines = self._outlets.lines
         if self.parts.methods != self._sequence.methods:
             self._sequence = self._sequence.replaced(self.parts.methods, self.parts.unknowns.counted())
         self.iterate, self.renewals = self._first_iterate(), self.renewals + 1
@@ -109,6 +112,8 @@ class FlowOnCells:
         """Set loads and history terms of a step; slip_rate: see `SlipHistory.rate`."""
         system, rule, last = self.parts.system, step.difference, self.history.past[0].velocity
         system.slip_rate = slip_rate
+        self._outlets.begin_step(None if self._settings.steady else step.dt)
+        system.outlets.lines = self._outlets.lines
         system.begin_step(step, self.history.rate(rule), self.history.missing(rule), last)
 
     def prescribe(self, t: float) -> None:
@@ -128,6 +133,7 @@ class FlowOnCells:
         """Accept a step of length dt [s]; wet: mask of the facets that the fluid acts on."""
         system = self.parts.system
         assert system.cut is not None
+        self._outlets.end_step(system.outlets.rates(self.iterate.values()).tolist())
         system.end_step()
         found = system.active_dofs | system.dofs_of(system.cut.contact_cells)
         velocity = self.velocity()
@@ -190,7 +196,8 @@ class FlowOnCells:
         nested = {"first": self.box.first, "width": self.box.width} if isinstance(self.box, Nested) else {}
         closed = np.unique(np.concatenate(self._comm.allgather(np.flatnonzero(self.parts.cutter.closed))))
         state = self.history.save(self.parts.unknowns) | self.parts.system.save()
-        return state | {"nested": nested, "closed": closed, "linear_solver": self._sequence.position}
+        state |= {"nested": nested, "closed": closed, "outlets": self._outlets.save()}
+        return state | {"linear_solver": self._sequence.position}
 
     def restore_cells(self, state: State, sheets: Sheets | None, *, follow: bool) -> None:
         """Take the cells of a saved state; follow: nested ones may be others."""
@@ -206,5 +213,6 @@ class FlowOnCells:
         own = scatter(self._comm, state, self.save()) if gathered else state
         self.history.restore(self.parts.unknowns, own)
         self.parts.system.restore(own)
+        self._outlets.restore(own["outlets"])
         self._sequence.position = own["linear_solver"]
         self.parts.cutter.restore(own["closed"])

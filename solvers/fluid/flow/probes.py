@@ -7,7 +7,7 @@ all extensive quantities are per depth.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import ufl
@@ -21,6 +21,7 @@ from solvers.fluid.mesh.space import FlowNodes
 from solvers.fluid.surfaces.inside import INSIDE, require_outside, winding
 from solvers.fluid.terms import forms
 from solvers.fluid.terms.boundary.covered_faces import CoveredFaces, covered_faces
+from solvers.fluid.terms.boundary.patches import outlet_laws
 from solvers.mesh.lagrange import lagrange
 
 Probe = Callable[[], dict[str, float]]
@@ -156,6 +157,12 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
     return probe
 
 
+def of_outlet(fluid: Fluid, patch: str) -> Probe:
+    """Probe of the pressure [Pa] that the law of an outlet gives for its flow rate (collective)."""
+    number = list(outlet_laws(fluid.patches)).index(patch)
+    return lambda: {"": float(fluid.system.outlets.pressures(fluid.iterate.values())[number])}
+
+
 class FlowRate(Protocol):
     def __call__(self, patches: Sequence[str], among: NDArray[np.bool_] | None = None) -> float: ...
 
@@ -285,14 +292,16 @@ def of_fluid(fluid: Fluid, quantity: str) -> Probe:
     def integrals() -> list[fem.Integral]:
         settings, domain, degree = fluid.settings, fluid.grid.domain, fluid.unknowns.degree
         u, weights = fluid.unknowns.parts(fluid.system.flow)[0], fluid.system.weights
-        density, viscosity = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
-        density_of = {
-            "kinetic_energy": 0.5 * density * ufl.dot(u, u),
-            "dissipation": 2.0 * viscosity * ufl.inner(forms.eps(u), forms.eps(u)),
-        }[quantity]
-        parts = [fem.Integral(domain, density_of * fem.measure(domain, "dx", 2 * degree))]
+        density = fem.constant(domain, settings.density)
+
+        def density_of(flow: forms.Coefficients) -> Any:
+            if quantity == "kinetic_energy":
+                return 0.5 * density * ufl.dot(u, u)
+            return ufl.inner(forms.viscous_stress(flow, u), forms.eps(u))
+
+        parts = [fem.Integral(domain, density_of(fluid.system.terms) * fem.measure(domain, "dx", 2 * degree))]
         if fluid.bodies:
-            on_cut = weights.fluid * density_of * fem.measure(domain, "dx", weights.degree)
+            on_cut = weights.fluid * density_of(fluid.system.on_cut) * fem.measure(domain, "dx", weights.degree)
             parts.append(fem.Integral(domain, on_cut))
         return parts
 

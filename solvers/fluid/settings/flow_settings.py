@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from solvers.fluid.settings.penalties import Penalties
+from solvers.fluid.settings.shear_law import ShearLaw
 from solvers.fluid.settings.time_scheme import SCHEMES, FlowTimeScheme
 from solvers.values import Value
 
@@ -17,6 +18,7 @@ class FlowSettings:
 
     density: float  #: [kg/m^3]
     viscosity: float  #: [Pa s]
+    shear: ShearLaw | None = None  #: of the viscosity, which is that at rest then; None: it is constant
     element: Literal["q1q1", "q2q1"] = "q1q1"
     convection: bool = True  #: False: Stokes
     scheme: str | FlowTimeScheme = "bdf2"  #: one of `SCHEMES`, or another

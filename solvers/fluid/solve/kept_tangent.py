@@ -42,6 +42,7 @@ class KeptTangent:
         self.diagonal = np.abs(matrix.getDiagonal().array)
         # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self._system.grid.dim * rounding_error(matrix, values)
+        self.rounding += self._system.outlets.rounding(values)
         return matrix
 
     def rounding_error(self, linearise: Callable[[], PETSc.Mat]) -> Array:

@@ -26,12 +26,15 @@ from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.space import Unknowns, set_velocity
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.time_scheme import FlowStep
+from solvers.fluid.solve.cell_viscosity import CellViscosity
 from solvers.fluid.solve.hanging_system import HangingSystem
+from solvers.fluid.solve.outlet_terms import OutletTerms
 from solvers.fluid.solve.tangent_matrix import TangentMatrix
 from solvers.fluid.surfaces.surface import ImmersedSurface, by_facets, may_close, seeping
 from solvers.fluid.terms import nitsche
 from solvers.fluid.terms.boundary.outer_faces import OuterFaces, OuterOnCut
-from solvers.fluid.terms.boundary.patches import Boundary
+from solvers.fluid.terms.boundary.patches import Boundary, outlet_laws
+from solvers.fluid.terms.boundary.windkessel import Outlets
 from solvers.fluid.terms.cell_forms import cell_forms, coefficients
 from solvers.fluid.terms.closed_contact.zone import ClosedZone, find_zone
 from solvers.fluid.terms.closed_contact.zone_entries import with_zone
@@ -69,14 +72,16 @@ class FlowSystem:
         self.weights = Weights(grid, settings.degree)
         parts = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
         self.terms = coefficients(domain, settings, *parts, alpha=(self._alpha, self._scale_alpha), newton=self._newton)
+        self.viscosity = CellViscosity(unknowns, settings)
+        self.on_cut = self.viscosity.on_cut(self.terms)  #: coefficients in cut cells
         #: gaps of a few cells, with first-order velocities
-        self.gaps = (
-            GapTerms(grid, settings.viscosity, settings.density) if with_bodies and settings.degree == 1 else None
-        )
-        with_gaps = self.terms, settings.penalties, self.gaps
-        self.cut_penalty = choose_cut_penalty(unknowns, *with_gaps) if with_bodies else None
+        with_gaps = with_bodies and settings.degree == 1
+        self.gaps = GapTerms(grid, settings.viscosity, settings.density) if with_gaps else None
+        on_faces = self.viscosity.on_faces(self.terms), settings.penalties, self.gaps
+        self.cut_penalty = choose_cut_penalty(unknowns, *on_faces) if with_bodies else None
         of_gaps = None if self.gaps is None else self.gaps.scales
-        self.forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None, of_gaps)
+        of_cut = self.weights if with_bodies else None
+        self.forms = cell_forms(unknowns, self.terms, self.flow, of_cut, of_gaps, on_cut=self.on_cut)
         self._hanging = (
             None if unknowns.hanging is None else HangingSystem(unknowns, unknowns.hanging, self.forms.tangents[0])
         )
@@ -89,6 +94,7 @@ class FlowSystem:
         self._residuals: list = []
         self._tangents: list = []
         self._outer_on_cut = OuterOnCut()
+        self.outlets = OutletTerms(unknowns, Outlets(outlet_laws(boundary.patches)).lines)
         self.speed = np.zeros(len(grid.numbers))  #: largest |a| at the nodes of each local cell [m/s]
         self.fastest = 0.0  #: largest |a| of all cells [m/s]
         self.active_dofs = np.zeros(unknowns.local, dtype=bool)  #: dofs of active cells
@@ -182,6 +188,7 @@ class FlowSystem:
             for integrals in (self.forms.residuals, self.forms.tangents)
         )
         self._outer_on_cut = self._outer.on_cut(cut, active)
+        self.outlets.set(self._outer_on_cut.fluxes)
         self._tangents += self._outer_on_cut.tangents
         if self._hanging is not None:
             self._tangents[0] = self._hanging.set_cells(self.cells[0], self._outer_on_cut.hanging)
@@ -255,7 +262,8 @@ class FlowSystem:
 
     def _follow(self) -> None:
         """Update weights, interface and cut penalty to the present cut and scales (collective)."""
-        if self._current:
+        changed = self.with_bodies and self.viscosity.update(self.flow.x.array)
+        if self._current and not changed:
             return
         assert self.cut is not None
         cut = self.cut
@@ -267,7 +275,7 @@ class FlowSystem:
                 self.unknowns,
                 self.weights,
                 cut,
-                self.settings.viscosity,
+                self.viscosity.of(cut.cut[cut.pieces.cell]),
                 penalty,
                 self.slip_length,
                 self.transmissivity,
@@ -313,7 +321,7 @@ class FlowSystem:
         """P of pieces [Pa s/m], shape (pieces, dim, dim)."""
         settings, cells = self.settings, cut.cut[pieces.cell]
         g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
-        flow = settings.viscosity, settings.density, float(self._alpha.value)
+        flow = self.viscosity.of(cells), settings.density, float(self._alpha.value)
         speeds, sizes = (self.speed[cells], g * settings.convection), self.grid.sizes[cells]
         reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
         least: Array | float = 0.0
@@ -358,16 +366,17 @@ class FlowSystem:
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
-        rows = self._out[:owned]
+        rows, flow, penalty = self._out[:owned], self.flow.x.array[:owned], self.matrix.penalty
         if self._hanging is not None:
             rows = self._hanging.table.rows(rows)
-        penalty = self.matrix.penalty
-        return rows.copy() if penalty is None else rows + penalty.times(self.flow.x.array[:owned])
+        rows = rows + self.outlets.rows(flow)
+        return rows if penalty is None else rows + penalty.times(flow)
 
     def tangent(self, identity: NDArray[np.bool_], *, picard: bool) -> PETSc.Mat:
-        """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
+        """d(residual)/d(flow) without `outlets.product`; the next call overwrites it.
 
-        picard: u . grad u is linearised without its second term, about the velocity of `set_scales`.
+        identity: owned dofs with such rows; picard: u . grad u is linearised without its second term, about the
+        velocity of `set_scales`.
         """
         self._follow()
         self._newton.value = 0.0 if picard else 1.0
@@ -480,11 +489,12 @@ class FlowSystem:
         for form in self._outer_on_cut.residuals:
             fem.assemble_vector(form, out)
         self._add_covered(out)
+        out[: self.unknowns.owned] += self.outlets.rows(self.flow.x.array[: self.unknowns.owned])
         return out
 
     def _add_covered(self, out: Array) -> None:
         self._outer.add_covered(self._outer_on_cut, out, self.flow.x.array, *self._outer_scales())
 
-    def _outer_scales(self) -> tuple[float, float, Array]:
-        settings = self.settings
-        return settings.viscosity, settings.density if settings.convection else 0.0, self._scale_velocity.x.array
+    def _outer_scales(self) -> tuple[float | Array, float, Array]:
+        density = self.settings.density if self.settings.convection else 0.0
+        return self.viscosity.of(np.arange(len(self.grid.sizes))), density, self._scale_velocity.x.array

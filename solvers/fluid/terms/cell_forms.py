@@ -46,7 +46,15 @@ def coefficients(
         steady=settings.steady,
         degree=settings.degree,
         mesh=domain.mesh.ufl_domain(),
+        shear=_shear(domain, settings),
     )
+
+
+def _shear(domain: fem.Domain, settings: FlowSettings) -> tuple[Any, Any, Any] | None:
+    """Constants of the law of shear, so that all flows share their compiled forms; None: there is none."""
+    if (law := settings.shear) is None:
+        return None
+    return fem.constant(domain, law.infinite), fem.constant(domain, law.time), fem.constant(domain, law.exponent)
 
 
 def cell_forms(
@@ -55,17 +63,20 @@ def cell_forms(
     function: Any,
     weights: Weights | None,
     gaps: forms.GapScales | None = None,
+    *,
+    on_cut: forms.Coefficients | None = None,
 ) -> CellForms:
     """Forms at a function of velocity and pressure; weights: coefficients of cut cells, None without bodies.
 
-    gaps: coefficients of gaps, for first degree.
+    on_cut: coefficients of the terms in cut cells, None: `flow`; gaps: coefficients of gaps, for first degree.
     """
     domain = unknowns.grid.domain
     test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
-    residuals = _residuals(unknowns, flow, function, test, weights, gaps)
+    both = flow, on_cut or flow
+    residuals = _residuals(unknowns, both, function, test, weights, gaps)
     # the body force has no derivative: without it, all flows share their compiled tangents
-    unloaded = replace(flow, force=forms.nothing(unknowns.grid.dim))
-    same_slope = _residuals(unknowns, unloaded, function, test, weights, gaps)
+    without, cut_without = (replace(terms, force=forms.nothing(unknowns.grid.dim)) for terms in both)
+    same_slope = _residuals(unknowns, (without, cut_without), function, test, weights, gaps)
     tangents = [ufl.derivative(form, function, trial) for form in same_slope]
     return CellForms(
         tuple(fem.Integral(domain, form) for form in residuals),
@@ -75,24 +86,24 @@ def cell_forms(
 
 def _residuals(
     unknowns: Unknowns,
-    flow: forms.Coefficients,
+    of: tuple[forms.Coefficients, forms.Coefficients],
     function: Any,
     test: Any,
     weights: Weights | None,
     gaps: forms.GapScales | None,
 ) -> list[Any]:
     """Forms over uncut cells and, with weights, over cut ones and films; in gaps: what is added in cut, uncut cells."""
-    domain, degree = unknowns.grid.domain, unknowns.degree
+    domain, degree, (flow, cut) = unknowns.grid.domain, unknowns.degree, of
     (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
-    everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
+    everywhere, in_cut = (forms.bulk(f, u, p, v, q) + forms.residual_based(f, u, p, v, q) for f in of)
     uncut = everywhere * fem.measure(domain, "dx", 2 * degree + 1)
     if weights is None:
         return [uncut]
     dx_cut = fem.measure(domain, "dx", weights.degree)
-    on_interface = nitsche.own(flow, weights, u, p, v, q)
+    on_interface = nitsche.own(cut, weights, u, p, v, q)
     if gaps is not None:
         added = forms.in_gaps(flow, gaps, u, p, q)
-        in_cut = weights.fluid * everywhere * dx_cut + on_interface * dx_cut
-        return [uncut, in_cut, weights.fluid * added * dx_cut, added * fem.measure(domain, "dx", 2 * degree + 1)]
-    film = forms.film(flow, u, p, v, q)
-    return [uncut, *(weights.fluid * bulk * dx_cut + on_interface * dx_cut for bulk in (everywhere, film))]
+        whole = weights.fluid * in_cut * dx_cut + on_interface * dx_cut
+        return [uncut, whole, weights.fluid * added * dx_cut, added * fem.measure(domain, "dx", 2 * degree + 1)]
+    film = forms.film(cut, u, p, v, q)
+    return [uncut, *(weights.fluid * bulk * dx_cut + on_interface * dx_cut for bulk in (in_cut, film))]

@@ -25,7 +25,7 @@ class Coefficients:
     """Coefficients that all terms share, and flags of the terms that a case leaves out."""
 
     rho: Expr  #: density [kg/m^3]
-    mu: Expr  #: viscosity [Pa s]
+    mu: Expr  #: viscosity [Pa s], that at rest with a law of shear
     alpha: Expr  #: d(u_t)/du [1/s]
     scale_alpha: Expr  #: alpha for the scales of the stabilisation, of a step whose length changes slowly [1/s]
     a: Expr  #: velocity [m/s] for the scales of the stabilisation
@@ -36,6 +36,15 @@ class Coefficients:
     steady: bool
     degree: int  #: of the velocity
     mesh: Any
+    shear: tuple[Expr, Expr, Expr] | None = None  #: mu_inf [Pa s], time [s] and exponent of `ShearLaw`
+
+    def viscosity(self, u: Expr) -> Expr:
+        """mu [Pa s] where the velocity is u."""
+        if self.shear is None:
+            return self.mu
+        infinite, time, exponent = self.shear
+        square = 2.0 * time**2 * inner(eps(u), eps(u))
+        return infinite + (self.mu - infinite) * (1.0 + square) ** (0.5 * (exponent - 1.0))
 
     @property
     def sizes(self) -> list[Expr]:
@@ -79,7 +88,12 @@ def eps(u: Expr) -> Expr:
 
 
 def sigma(flow: Coefficients, u: Expr, p: Expr) -> Expr:
-    return 2.0 * flow.mu * eps(u) - p * ufl.Identity(len(u))
+    return viscous_stress(flow, u) - p * ufl.Identity(len(u))
+
+
+def viscous_stress(flow: Coefficients, u: Expr) -> Expr:
+    """2 mu eps(u)."""
+    return 2.0 * flow.viscosity(u) * eps(u)
 
 
 def inertia(flow: Coefficients, u: Expr) -> Expr:
@@ -94,7 +108,7 @@ def inertia(flow: Coefficients, u: Expr) -> Expr:
 
 def bulk(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand of rho (u_t + u . grad u, v) + (2 mu eps(u), eps(v)) - (p, div v) + (q, div u) - (f, v)."""
-    return dot(inertia(flow, u), v) + inner(2.0 * flow.mu * eps(u), eps(v)) - p * div(v) + q * div(u)
+    return dot(inertia(flow, u), v) + inner(viscous_stress(flow, u), eps(v)) - p * div(v) + q * div(u)
 
 
 def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
@@ -150,7 +164,9 @@ def _tested(flow: Coefficients, u: Expr, p: Expr, test: Expr) -> Expr:
     directions = [len(metric) * g**2 for g in metric] if flow.degree == 1 else [square] * len(metric)
     strong = inertia(flow, u) + grad(p)
     if flow.degree > 1:
-        strong -= flow.mu * div(grad(u))
+        strong -= flow.viscosity(u) * div(grad(u))
+        if flow.shear is not None:
+            strong -= 2.0 * dot(eps(u), grad(flow.viscosity(u)))
     return sum(test[i] * strong[i] / sqrt(common + viscous * g) for i, g in enumerate(directions))
 
 
@@ -159,7 +175,7 @@ def _rates(flow: Coefficients) -> tuple[list[Expr], Expr, Expr]:
     common = _convective(flow)
     if not flow.steady:
         common += 4.0 * flow.rho**2 * flow.scale_alpha**2
-    return _metric(flow), common, (36.0 if flow.degree == 1 else 144.0) * flow.mu**2
+    return _metric(flow), common, (36.0 if flow.degree == 1 else 144.0) * flow.viscosity(flow.a) ** 2
 
 
 def _metric(flow: Coefficients) -> list[Expr]:

@@ -53,13 +53,14 @@ class InterfaceTerms:
         unknowns: Unknowns,
         rule: Weights,
         cut: Cut,
-        mu: float,
+        mu: float | Array,
         penalty: Array,
         slip_length: Array | None = None,
         transmissivity: Array | None = None,
         slip_inertia: Array | None = None,
     ):
-        """mu [Pa s]; penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by facets, None if zero.
+        """mu [Pa s], by pieces if it varies; penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by
+        facets, None if zero.
 
         slip_inertia: rho gamma_t h sum_k beta_k s_{n-k} at the corners of pieces [Pa], (pieces, dim), see
         `slip_history`; None: zero.
@@ -67,7 +68,10 @@ class InterfaceTerms:
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells, facet = cut.cut[pieces.cell[mine]], pieces.facet[mine]
-        self.mu, self.dim, self._unknowns, self.vertices = mu, grid.dim, unknowns, len(cut.motion.x)
+        mu = mu if isinstance(mu, float) else mu[mine]
+        #: mean, for the derivatives by the motion of surfaces
+        self.mu = mu if isinstance(mu, float) else float(mu.mean()) if len(mu) else 0.0
+        self.dim, self._unknowns, self.vertices = grid.dim, unknowns, len(cut.motion.x)
         self.comm = grid.comm
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]

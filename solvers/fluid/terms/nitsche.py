@@ -49,7 +49,7 @@ def own(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) ->
 
 
 def penalties(
-    flow: tuple[float, float, float],
+    flow: tuple[float | Array, float, float],
     factors: Penalties,
     degree: int,
     n: Array,
@@ -64,8 +64,8 @@ def penalties(
     s = mu max(gamma C_T / (r h), c) + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) with
     h = (sum n_i^2 / h_i^2)^(-1/2), the length of a cell along the normal, r: `reduced`, in gaps of less than a cell, c:
     `least` [1/m], in films.
-    flow: mu [Pa s], rho [kg/m^3], alpha [1/s]; n, edge lengths of the cells [m], g [m/s]: (pieces, dim);
-    speed: |a| [m/s], (pieces,).
+    flow: mu [Pa s] (by pieces if it varies), rho [kg/m^3], alpha [1/s]; n, edge lengths of the cells [m], g [m/s]:
+    (pieces, dim); speed: |a| [m/s], (pieces,).
     """
     (mu, rho, alpha), dim = flow, n.shape[1]
     h = 1.0 / np.linalg.norm(n / sizes, axis=1)
@@ -81,14 +81,14 @@ def slip_mass(rho: float, factors: Penalties, n: Array, sizes: Array) -> Array:
     return mass
 
 
-def stress(mu: float, n: Array, P: Array) -> Array:
+def stress(mu: float | Array, n: Array, P: Array) -> Array:
     """Coefficients K of the traction t for a velocity phi e_k: t_i = sum_f K[f, k, i] (phi, grad phi)_f.
 
     mu [Pa s]; n: (pieces, dim); P: (pieces, dim, dim). Shape (pieces, 1 + dim, dim, dim).
     """
     identity = np.eye(n.shape[1])
     slope = np.einsum("pj,ki->pjki", n, identity) + np.einsum("pk,ij->pjki", n, identity)
-    return np.concatenate([-P[:, None], mu * slope], axis=1)
+    return np.concatenate([-P[:, None], np.reshape(mu, (-1, 1, 1, 1)) * slope], axis=1)
 
 
 def compliance(c: Array, projector: Array, P: Array) -> Array:
@@ -98,7 +98,9 @@ def compliance(c: Array, projector: Array, P: Array) -> Array:
         return (1.0 / (1.0 / c + s))[:, None, None] * projector
 
 
-def released(mu: float, n: Array, P: Array, D: Array, area: Array, table: tuple[Array, Array], sizes: Array) -> Array:
+def released(
+    mu: float | Array, n: Array, P: Array, D: Array, area: Array, table: tuple[Array, Array], sizes: Array
+) -> Array:
     """-<D t(u), t(v)> by pieces, shape (pieces, functions, dim, functions, dim); zero where D is zero.
 
     area: int L_q, (pieces, points); table: values (points, functions) and reference gradients (points, functions, dim)
@@ -106,18 +108,18 @@ def released(mu: float, n: Array, P: Array, D: Array, area: Array, table: tuple[
     """
     functions, dim = table[0].shape[1], n.shape[1]
     block = np.zeros((len(n), functions, dim, functions, dim))
-    gives = np.flatnonzero(D.any(axis=(1, 2)))
+    gives, mu = np.flatnonzero(D.any(axis=(1, 2))), np.broadcast_to(mu, len(n))
     for some in (gives[first : first + PIECES_AT_ONCE] for first in range(0, len(gives), PIECES_AT_ONCE)):
-        block[some] = _squares(mu, n[some], P[some], D[some], -area[some], table, sizes[some])
+        block[some] = _squares(mu[some], n[some], P[some], D[some], -area[some], table, sizes[some])
     return block
 
 
-def _squares(mu: float, n: Array, P: Array, D: Array, weight: Array, table: tuple[Array, Array], sizes: Array) -> Array:
+def _squares(mu: Array, n: Array, P: Array, D: Array, weight: Array, table: tuple[Array, Array], sizes: Array) -> Array:
     """int weight t(phi_b e_l) . D t(phi_a e_k), shape (pieces, a, k, b, l).
 
     t(phi_a e_k) = S_a e_k + n_k g_a with S_a = mu d_n phi_a - s phi_a and g_a = mu grad phi_a - s_n phi_a n.
     """
-    dim, phi, grad = n.shape[1], table[0], mu * table[1] / sizes[:, None, None, :]
+    dim, phi, grad = n.shape[1], table[0], mu[:, None, None, None] * table[1] / sizes[:, None, None, :]
     s_total = np.einsum("pi,pij,pj->p", n, P, n)
     s = (np.einsum("pii->p", P) - s_total) / (dim - 1)
     S = np.einsum("pqai,pi->pqa", grad, n) - s[:, None, None] * phi

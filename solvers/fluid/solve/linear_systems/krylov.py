@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.algebra import linear
+from solvers.algebra.added_product import with_product
 from solvers.algebra.lagged import Lagged, LaggedFactors
 from solvers.algebra.rounded_product import RoundedProducts
+from solvers.api import Array
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.solve.linear_systems.multigrid import Marker, Multigrid
 
@@ -132,26 +134,30 @@ class FlowSolver:
         held: NDArray[np.bool_],
         near: Marker,
         *,
+        added: Callable[[Array], Array] | None = None,
         reduction: float = 0.0,
     ) -> int:
-        """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
+        """Solve (matrix + added) x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
 
-        held: owned unknowns whose rows are those of the identity; near: marks those near surfaces; reduction: of the
-        residual that is good enough.
+        held: owned unknowns whose rows are those of the identity; near: marks those near surfaces; added: a part of low
+        rank as a product with vectors; reduction: of the residual that is good enough.
         """
+
+        def whole(product: PETSc.Mat) -> PETSc.Mat:
+            return product if added is None else with_product(product, added)
+
         tolerance = max(self._tolerance, reduction)
         while self.sequence.current != "direct":
             try:
                 product = self.products.of(matrix, tolerance)
-                iterations = self._krylov.solve_again(product, b, x, reduction=reduction)
+                iterations = self._krylov.solve_again(whole(product), b, x, reduction=reduction)
                 if iterations is not None:
                     return iterations
-                return self._krylov.solve(
-                    self._create(matrix, held, near, product), product, b, x, matrix, reduction=reduction
-                )
+                ksp = self._create(matrix, held, near, product)
+                return self._krylov.solve(ksp, whole(product), b, x, matrix, reduction=reduction)
             except linear.LinearSolveFailed as failure:
                 self.sequence.advance(failure)
-        return self._direct.solve(matrix, b, x)
+        return self._direct.solve(whole(matrix), b, x, matrix)
 
     def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker, product: PETSc.Mat) -> PETSc.KSP:
         comm, method = self.sequence.comm, self.sequence.current

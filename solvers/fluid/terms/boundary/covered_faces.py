@@ -62,7 +62,7 @@ class CoveredFaces:
         weighted = self.weights[:, :, None] * traction
         return self.unknowns.cell_velocity[self.cells], np.einsum("qa,cqi->cai", shapes, weighted)
 
-    def outflow(self, mu: float, mass_flux: Array) -> Array:
+    def outflow(self, mu: float | Array, mass_flux: Array) -> Array:
         """d/du of the form of an outflow over the wet part [Pa s m^(dim-2)], (cells, functions, dim, functions, dim).
 
         -<mu (grad u)^T n, v> - <min(0, rho a . n) u, v> / 2; mass_flux: rho a at the points, (cells, points, dim).
@@ -72,7 +72,7 @@ class CoveredFaces:
         (cells, _, functions, dim), w = slopes.shape, self.weights
         block = np.zeros((cells, functions, dim, functions, dim))
         normal = 1.0 if self.side else -1.0
-        block[..., self.axis] = -mu * normal * np.einsum("cq,qa,cqbi->caib", w, shapes, slopes)
+        block[..., self.axis] = -normal * np.einsum("cq,qa,cqbi->caib", mu * w, shapes, slopes)
         back = 0.5 * np.minimum(0.0, self.outward(mass_flux))
         mass = np.einsum("cq,qa,qb->cab", w * back, shapes, shapes)
         for i in range(dim):

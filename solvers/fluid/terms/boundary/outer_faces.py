@@ -45,6 +45,7 @@ class OuterOnCut:
     tangents: tuple[Any, ...] = ()  #: their derivatives by the flow
     hanging: tuple[Any, ...] = ()  #: the same at cells with hanging nodes
     covered: tuple[tuple[Term, CoveredFaces], ...] = ()  #: faces that bodies cover in part
+    fluxes: tuple[Array, ...] = ()  #: int n . v over the wet part of each outlet with a law, at local dofs
 
 
 class OuterFaces:
@@ -83,6 +84,12 @@ class OuterFaces:
             for number, face, middle in self._outflows():
                 self.terms.append(term(PRESSURE_PATCH, (number,), [_hydrostatic(body_force, middle)], face))
 
+        self._unit_pressures = [
+            term(PRESSURE_PATCH, (number,), [1.0]) for number, patch in enumerate(boundary.patches) if patch.outlet
+        ]
+        for unit in self._unit_pressures:
+            set_velocity(unit.value.x.array, unknowns.velocity, [1.0], 0.0)
+
     def _outflows(self) -> Iterator[tuple[int, str, Array]]:
         """(patch, face of the box, middle [m] of its part there) of the patches of outflow (collective)."""
         for number, patch in enumerate(self.boundary.patches):
@@ -97,7 +104,8 @@ class OuterFaces:
 
     def integrals(self) -> list[fem.Integral]:
         """Forms to compile."""
-        return [form for term in self.terms for form in (term.residual, term.tangent) if form is not None]
+        terms = [*self.terms, *self._unit_pressures]
+        return [form for term in terms for form in (term.residual, term.tangent) if form is not None]
 
     def begin_step(self, t: float) -> None:
         """Set the given values to those at a time [s]."""
@@ -108,35 +116,52 @@ class OuterFaces:
 
     def on_cut(self, cut: Cut, active: NDArray[np.bool_]) -> OuterOnCut:
         """The forms over outer faces on a cut; active: mask of local cells with unknowns."""
-        residuals, tangents, hanging, covered, points = [], [], [], [], 2 * self.unknowns.degree + 1
-        by_patch = self.boundary.facets, self.boundary.cells
+        residuals, tangents, hanging, covered = [], [], [], []
         for term in self.terms:
-            facets, cells = (np.concatenate([parts[n] for n in term.patches]) for parts in by_patch)
-            if term.face is not None:
-                on = self.grid.on_face(fem.facet_midpoints(self.grid.domain, facets), term.face)
-                facets, cells = facets[on], cells[on]
-            uncovered, parts = covered_faces(
-                self.grid, self.unknowns, cut, points, facets, cells, self.boundary.wet_faces
-            )
-            wet = active[cells] & uncovered
-            residuals.append(term.residual.on(exterior_facet=np.sort(facets[wet])))
+            facets, cells, with_fluid = self._wet(term, cut, active)
+            residuals.append(term.residual.on(exterior_facet=np.sort(facets)))
             if term.tangent is not None:
                 apart = (
-                    np.zeros(len(wet), dtype=bool)
+                    np.zeros(len(cells), dtype=bool)
                     if self.unknowns.hanging is None
                     else self.unknowns.hanging.cells[cells]
                 )
-                tangents.append(term.tangent.on(exterior_facet=np.sort(facets[wet & ~apart])))
+                tangents.append(term.tangent.on(exterior_facet=np.sort(facets[~apart])))
                 if self.unknowns.hanging is not None:
-                    hanging.append(term.tangent.on(exterior_facet=np.sort(facets[wet & apart])))
-            with_fluid = [part.only(active) for part in parts]
-            covered += [(term, part) for part in with_fluid if len(part.cells)]
+                    hanging.append(term.tangent.on(exterior_facet=np.sort(facets[apart])))
+            covered += [(term, part) for part in with_fluid]
         for term, _ in covered:
             if (term.kind.slope if term.kind.depends_on_flow else term.kind.stress) is None:
                 raise CannotBeCovered([self.boundary.patches[n] for n in term.patches])
-        return OuterOnCut(tuple(residuals), tuple(tangents), tuple(hanging), tuple(covered))
+        fluxes = tuple(self._flux(unit, cut, active) for unit in self._unit_pressures)
+        return OuterOnCut(tuple(residuals), tuple(tangents), tuple(hanging), tuple(covered), fluxes)
 
-    def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
+    def _wet(
+        self, term: Term, cut: Cut, active: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], list[CoveredFaces]]:
+        """(facets with fluid that no body covers, their cells, those covered in part) of the patches of a term."""
+        by_patch = self.boundary.facets, self.boundary.cells
+        facets, cells = (np.concatenate([parts[n] for n in term.patches]) for parts in by_patch)
+        if term.face is not None:
+            on = self.grid.on_face(fem.facet_midpoints(self.grid.domain, facets), term.face)
+            facets, cells = facets[on], cells[on]
+        points, known = 2 * self.unknowns.degree + 1, self.boundary.wet_faces
+        uncovered, parts = covered_faces(self.grid, self.unknowns, cut, points, facets, cells, known)
+        wet = active[cells] & uncovered
+        with_fluid = [part.only(active) for part in parts]
+        return facets[wet], cells[wet], [part for part in with_fluid if len(part.cells)]
+
+    def _flux(self, unit: Term, cut: Cut, active: NDArray[np.bool_]) -> Array:
+        """int n . v over the wet part of a patch at local dofs; contributions to ghosts are not added up."""
+        found = np.zeros(self.unknowns.local)
+        facets, _, covered = self._wet(unit, cut, active)
+        fem.assemble_vector(unit.residual.on(exterior_facet=np.sort(facets)), found)
+        for part in covered:
+            dofs, load = part.load(part.along_normal(np.ones(part.weights.shape)))
+            np.add.at(found, dofs, load)
+        return found
+
+    def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float | Array, rho: float, a: Array) -> None:
         """Add the residual over the wet part of covered faces to local dofs; for mu, rho, a see `slopes`."""
         for term, part in on_cut.covered:
             if term.kind.stress is not None and term.value is not None:
@@ -145,15 +170,20 @@ class OuterFaces:
         for dofs, block in self.slopes(on_cut, mu, rho, a):
             np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, flow[dofs]))
 
-    def slopes(self, on_cut: OuterOnCut, mu: float, rho: float, a: Array) -> Iterator[tuple[NDArray[np.int32], Array]]:
+    def slopes(
+        self, on_cut: OuterOnCut, mu: float | Array, rho: float, a: Array
+    ) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """(local dofs, derivatives by the flow) of terms with u over the wet part of covered faces.
 
-        mu [Pa s]; rho [kg/m^3], zero without convection; a [m/s]: velocity of the step before, at local dofs.
+        mu [Pa s] (by local cells if it varies); rho [kg/m^3], zero without convection; a [m/s]: velocity of the
+        step before, at local dofs.
         """
         for term, part in on_cut.covered:
             if term.kind.slope is not None:
                 values = None if term.value is None else part.velocity(term.value.x.array)
-                yield self.unknowns.cell_velocity[part.cells], term.kind.slope(part, mu, rho * part.velocity(a), values)
+                viscosity = mu if isinstance(mu, float) else mu[part.cells, None]
+                slope = term.kind.slope(part, viscosity, rho * part.velocity(a), values)
+                yield self.unknowns.cell_velocity[part.cells], slope
 
 
 def _hydrostatic(body_force: Sequence[Value], middle: Array) -> Value:

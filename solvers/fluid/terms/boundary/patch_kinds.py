@@ -25,7 +25,7 @@ class PartlyCoveredFaces(Protocol):
         """Vectors of given lengths along the outward normal."""
         ...
 
-    def outflow(self, mu: float, mass_flux: Array) -> Array:
+    def outflow(self, mu: float | Array, mass_flux: Array) -> Array:
         """d/du of the form of an outflow."""
         ...
 
@@ -44,12 +44,13 @@ class PatchKind:
     periodic: bool = False
     #: (flow, u, value, n, v) -> integrand of -<t, v>; a number comes as such
     form: Callable[[Coefficients, Expr, Expr, Expr, Expr], Expr] | None = None
-    depends_on_flow: bool = False  #: the form has u, and is linear in it
+    depends_on_flow: bool = False  #: the form has u; where bodies cover a face, linearly
     #: The same for faces that bodies cover in part, at points of the wet part:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
     stress: Callable[[PartlyCoveredFaces, Array], Array] | None = None
-    #: (faces, mu, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before; for forms with u
-    slope: Callable[[PartlyCoveredFaces, float, Array, Array | None], Array] | None = None
+    #: (faces, mu, or (cells, 1) of it, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before;
+    #: for forms with u
+    slope: Callable[[PartlyCoveredFaces, float | Array, Array, Array | None], Array] | None = None
 
     @property
     def normal_given(self) -> bool:
@@ -69,10 +70,10 @@ def _pressure(flow: Coefficients, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
 
 def _slip_length(flow: Coefficients, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr:
     """<mu/b u, v>: the shear stress is -mu/b times the tangential velocity; the normal one is prescribed as zero."""
-    return flow.mu / b * _dot(u, v)
+    return flow.viscosity(u) / b * _dot(u, v)
 
 
-def _slip_slope(faces: PartlyCoveredFaces, mu: float, mass_flux: Array, b: Array | None) -> Array:
+def _slip_slope(faces: PartlyCoveredFaces, mu: float | Array, mass_flux: Array, b: Array | None) -> Array:
     assert b is not None
     return faces.friction(mu / b[:, :, 0])
 
@@ -85,7 +86,7 @@ def _outflow(flow: Coefficients, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr
     """
     import ufl
 
-    terms = -flow.mu * _dot(_dot(n, ufl.grad(u)), v)
+    terms = -flow.viscosity(u) * _dot(_dot(n, ufl.grad(u)), v)
     if flow.convection:
         back = 0.5 * (_dot(flow.a, n) - abs(_dot(flow.a, n)))
         terms -= 0.5 * flow.rho * back * _dot(u, v)
@@ -98,7 +99,11 @@ def _dot(a: Expr, b: Expr) -> Expr:
     return ufl.dot(a, b)
 
 
-#: By their names in `Patch` and in the case file.
+_OUTFLOW = PatchKind(
+    open=True, form=_outflow, depends_on_flow=True,
+    slope=lambda faces, mu, mass_flux, values: faces.outflow(mu, mass_flux),
+)  # fmt: skip
+#: By their names in `Patch` and in the case file. The pressure of resistance and windkessel is in `outlet_terms`.
 PATCH_KINDS: Mapping[str, PatchKind] = {
     "velocity": PatchKind("all", value="velocity"),
     "no_slip": PatchKind("all"),
@@ -110,9 +115,8 @@ PATCH_KINDS: Mapping[str, PatchKind] = {
         "tangential", value="number", open=True, form=_pressure,
         stress=lambda faces, p: -faces.along_normal(p[:, :, 0]),
     ),
-    "outflow": PatchKind(
-        open=True, form=_outflow, depends_on_flow=True,
-        slope=lambda faces, mu, mass_flux, values: faces.outflow(mu, mass_flux),
-    ),
+    "outflow": _OUTFLOW,
+    "resistance": _OUTFLOW,
+    "windkessel": _OUTFLOW,
     "periodic": PatchKind(periodic=True),
 }  # fmt: skip

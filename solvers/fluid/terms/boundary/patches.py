@@ -16,6 +16,7 @@ from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.terms.boundary.meeting_patches import meeting_patches
 from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS, PatchKind
 from solvers.fluid.terms.boundary.wet_faces import WetFaces
+from solvers.fluid.terms.boundary.windkessel import Windkessel
 from solvers.values import Value, evaluate
 
 
@@ -26,7 +27,8 @@ class Patch:
     velocity: all components are given; no_slip: they are zero; slip, symmetry: no normal velocity, no shear stress;
     traction [Pa]: sigma n is given; pressure [Pa]: n . sigma n = -p, no tangential velocity; outflow:
     mu du/dn - (p - p_h) n = 0, p_h: hydrostatic pressure of mean zero, modified where fluid enters; periodic: the flow
-    is the same on the opposite face, which belongs to the patch too. `kind` may also be a record of the user.
+    is the same on the opposite face, which belongs to the patch too; resistance, windkessel: outflow at the pressure of
+    `outlet`. `kind` may also be a record of the user.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Patch:
     kind: str | PatchKind
     value: Sequence[Value] | None = None  #: velocity, traction or pressure
     where: Value | None = None  #: positive on the part of the faces that belongs to the patch; None: all
+    outlet: Windkessel | None = None  #: its pressure by the flow rate; None: zero
 
     def __post_init__(self) -> None:
         assert set(self.faces) <= set(FACES)
@@ -57,6 +60,11 @@ def periodic_axes(patches: Sequence[Patch]) -> tuple[int, ...]:
     faces = {face for patch in patches if patch.record.periodic for face in patch.faces}
     assert all(face[0] + other in faces for face in faces for other in "-+"), "both ends of a period"
     return tuple(sorted({"xyz".index(face[0]) for face in faces}))
+
+
+def outlet_laws(patches: Sequence[Patch]) -> dict[str, Windkessel]:
+    """The laws of all patches that have one, by name."""
+    return {patch.name: patch.outlet for patch in patches if patch.outlet is not None}
 
 
 def wall_faces(patches: Sequence[Patch]) -> list[tuple[int, int]]:

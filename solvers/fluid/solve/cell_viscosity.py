@@ -1,0 +1,61 @@
+"""The viscosity of cut cells, one number for each cell: that of the middle of the cell at the present iterate.
+
+All terms of a surface have it (`nitsche`), so that they stay consistent and action is reaction. Uncut cells have the
+viscosity of each point. The tangent has no derivative of the viscosity of cut cells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+from ufl import avg
+
+from solvers import fem
+from solvers.api import Array, Indices32
+from solvers.fluid.mesh.space import Unknowns
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.terms.forms import Coefficients
+
+
+class CellViscosity:
+    """Without a law of shear, the constant viscosity."""
+
+    def __init__(self, unknowns: Unknowns, settings: FlowSettings):
+        self._unknowns, self._settings, domain = unknowns, settings, unknowns.grid.domain
+        self._function = None if settings.shear is None else fem.function(fem.cellwise_space(domain))
+        _, slopes = fem.tabulate_lagrange(domain, settings.degree, np.full((1, unknowns.dim), 0.5))
+        self._slopes: Array = slopes[0]
+        if self._function is not None:
+            self._function.x.array[:] = settings.viscosity
+
+    def on_cut(self, flow: Coefficients) -> Coefficients:
+        """The coefficients in cut cells."""
+        return flow if self._function is None else replace(flow, mu=self._function, shear=None)
+
+    def on_faces(self, flow: Coefficients) -> Coefficients:
+        """The coefficients on faces between cells."""
+        return flow if self._function is None else replace(flow, mu=avg(self._function), shear=None)
+
+    def of(self, cells: Indices32) -> Array | float:
+        """mu [Pa s] of local cells."""
+        if self._function is None:
+            return self._settings.viscosity
+        found: Array = self._function.x.array[cells]
+        return found
+
+    def update(self, flow: Array) -> bool:
+        """Take the viscosity of a flow at local dofs; whether it has changed on any process (collective)."""
+        if self._function is None:
+            return False
+        mu, law, grid = self._settings.viscosity, self._settings.shear, self._unknowns.grid
+        assert law is not None
+        gradient = self._slopes / grid.sizes[:, None]
+        slope = np.swapaxes(flow[self._unknowns.cell_velocity], 1, 2) @ gradient
+        square = 0.5 * ((slope + np.swapaxes(slope, 1, 2)) ** 2).sum(axis=(1, 2))
+        power = (1.0 + law.time**2 * square) ** (0.5 * (law.exponent - 1.0))
+        new = law.infinite + (mu - law.infinite) * power
+        changed = not np.array_equal(new, self._function.x.array)
+        self._function.x.array[:] = new
+        return bool(grid.comm.allreduce(changed, op=MPI.LOR))
