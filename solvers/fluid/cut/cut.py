@@ -13,7 +13,15 @@ from solvers.api import Array, Indices32
 from solvers.fluid.cut.film import Films, Walls, creeping_cells, walls_of
 from solvers.fluid.cut.gaps import GapFinder, NarrowGaps
 from solvers.fluid.geometry.overlaps import Known, with_unions
-from solvers.fluid.geometry.pieces import NOTHING, Pieces, cells_across, in_planes, off_boundary, put_where_fluid_is
+from solvers.fluid.geometry.pieces import (
+    NOTHING,
+    Pieces,
+    cells_across,
+    in_planes,
+    off_boundary,
+    put_where_fluid_is,
+    without_slivers,
+)
 from solvers.fluid.geometry.tied_slits import filled, slivers_of, without_slits
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
@@ -158,7 +166,7 @@ class Cutter:
             self._special[:] = False  # a cell behind a thin body is one of its other side
         self._depth = max(self._depth, layers)
         nearby = _grow(self._own, self._depth + MARGIN)
-        x = in_planes(box, motion.x)
+        x = in_planes(box, motion.x) if grid.sheets is None else without_slivers(box, facets, motion.x)
         moments = kernels.moments(box.edges, self.points, x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])

@@ -39,17 +39,32 @@ class Pieces:
         return sum(others, start=first)  # NumPy's sum over three neighbours takes five times as long
 
 
-def in_planes(grid: Grid, x: Array) -> Array:
-    """Vertices [m], those beside a plane of the grid by rounding put into it.
+def in_planes(grid: Grid, x: Array, share: float = 0.0) -> Array:
+    """Vertices [m], those beside a plane of the grid by rounding, or by a share of the smallest cell, put into it.
 
     Then the kernel knows from the normal which of the two cells has the fluid.
     """
     placed = x.copy()
     for axis, edge in enumerate(grid.edges):
         above = np.clip(np.searchsorted(edge, x[:, axis]), 1, len(edge) - 1)
+        reach = max(ROUNDING_OF_POSITION * float(np.abs(edge).max()), share * float(np.diff(edge).min()))
         for plane in (edge[above - 1], edge[above]):
-            near = np.abs(x[:, axis] - plane) <= ROUNDING_OF_POSITION * np.abs(edge).max()
+            near = np.abs(x[:, axis] - plane) <= reach
             placed[near, axis] = plane[near]
+    return placed
+
+
+def without_slivers(grid: Grid, facets: Indices, x: Array) -> Array:
+    """Vertices [m] without slivers of fluid between facets and planes of the grid that the cut takes for solid.
+
+    Those beside a plane by `NOTHING` are put into it, and facets on the boundary of the box, see `off_boundary`, too.
+    """
+    placed = in_planes(grid, x, NOTHING)
+    for axis, edge in enumerate(grid.edges):
+        near = FLUSH * float(np.diff(edge).min())
+        for end in (edge[0], edge[-1]):
+            flush = (np.abs(x[facets, axis] - end) <= near).all(axis=1)
+            placed[facets[flush], axis] = end
     return placed
 
 
