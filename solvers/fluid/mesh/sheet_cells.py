@@ -12,7 +12,7 @@ from solvers import fem
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
 from solvers.fluid.geometry.pieces import joined_pieces, selected
-from solvers.fluid.geometry.thin.fluid_parts import pieces_of_regions
+from solvers.fluid.geometry.regions import pieces_of_regions
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.periodic import BEYOND_NODES, LatticeNodes
 from solvers.mesh.gauss import tensor_weights

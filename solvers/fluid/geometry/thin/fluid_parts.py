@@ -12,20 +12,14 @@ from scipy import ndimage
 from solvers.api import Array, Indices, Mask
 from solvers.cut_cells import CellState, ClosedSurfaces, CutTable, components_of, cut_cells
 from solvers.fluid.geometry.bodies import bodies_of
-from solvers.fluid.geometry.pieces import NOTHING, ROUNDING_OF_POSITION, Pieces, place_of
+from solvers.fluid.geometry.pieces import NOTHING, place_of
+from solvers.fluid.geometry.regions import SAME_VOLUME, closing_length, largest_faces, touching_cells
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import gauss
 from solvers.mesh.lagrange import lagrange
 from solvers.mesh.tessellation import unit_normals
 
 LAYERS_AROUND = 3  #: layers of cells around surfaces in which parts and links are found
-
-#: Area of a face, and difference of volumes, relative to a cell, that are rounding error.
-SAME_VOLUME = 1e-9
-
-#: Closing length in rounding errors of a position. Two surfaces in 3D are 2 sqrt(3) of them apart, or less, where they
-#: touch. Where they part at an angle, the end of what is closed is as long and bounds nothing: a longer one leaks.
-TOUCHING = 8.0
 
 COUNTS = (2, 3, 5)  #: points in one direction that tables can have
 
@@ -50,12 +44,7 @@ class Geometry:
 
     def cut(self, edges: Sequence[Array], count: int) -> CutTable:
         """The table of these grid lines."""
-        return cut_cells(edges, gauss(count)[0], self.surfaces, self.x, closing=self.closing)
-
-    @property
-    def closing(self) -> float:
-        """The closing length [m]."""
-        return TOUCHING * ROUNDING_OF_POSITION * max(float(np.abs(edge).max()) for edge in self.grid.edges)
+        return cut_cells(edges, gauss(count)[0], self.surfaces, self.x, closing=closing_length(self.grid))
 
 
 @dataclass(frozen=True)
@@ -140,17 +129,17 @@ def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts
     table, fluid = geometry.table(3), 1.0 - moments.fraction
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True
-    touching, single = _touching(grid, moments, table, geometry.surfaces)
+    touching, several = touching_cells(grid, moments, table, geometry.surfaces.body)
     total = np.bincount(table.cell, table.share, grid.size)
     with_surface = np.zeros(grid.size, dtype=bool)
     with_surface[moments.cells[moments.piece_cell]] = True
     filled = ~with_surface & (fluid <= NOTHING)
     closed = np.bincount(table.closed_cell, table.closed_moments.sum(axis=(1, 2)), grid.size)
-    rounding = SAME_VOLUME + geometry.closing * closed / grid.cell_sizes().prod(axis=1)
-    unknown = single & (np.abs(total - fluid) > rounding) & (table.state != CellState.FLUID)
+    rounding = SAME_VOLUME + closing_length(grid) * closed / grid.cell_sizes().prod(axis=1)
+    unknown = ~several & (np.abs(total - fluid) > rounding) & (table.state != CellState.FLUID)
     known = (table.state == CellState.CUT) & ~unknown & ~filled
 
-    area, face = np.bincount(table.piece_region, table.piece_area, len(table.cell)), _largest_faces(grid)
+    area, face = np.bincount(table.piece_region, table.piece_area, len(table.cell)), largest_faces(grid)
     kept = np.flatnonzero(known[table.cell] & ((table.share > NOTHING) | (area > NOTHING * face[table.cell])))
     whole = np.flatnonzero(grown(grid, special, LAYERS_AROUND) & ~filled & (fluid > NOTHING) & (
         (table.state == CellState.FLUID) | unknown
@@ -169,31 +158,7 @@ def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts
     pieces = np.concatenate([pieces, np.stack([rest, moments.piece_facet[in_unknown]], axis=1)])
     pieces = np.unique(pieces[pieces[:, 0] >= 0], axis=0)
     links = _links(grid, table, part, part_of_cell)
-    return FluidParts(geometry, cell, share, region, links, special, touching, pieces)
-
-
-def _touching(grid: Grid, moments, table: CutTable, surfaces: ClosedSurfaces) -> tuple[Indices, Mask]:
-    """(cells in which bodies touch, mask of cells with the surface of one body at most).
-
-    The union of the bodies has less volume there than they have together, or less surface, or something is closed.
-    """
-    of_piece = moments.cells[moments.piece_cell]
-    bodies = int(surfaces.body.max(initial=0)) + 1
-    pairs = np.unique(of_piece * bodies + surfaces.body[moments.piece_facet])
-    several = np.bincount(pairs // bodies, minlength=grid.size) > 1
-    volume = np.where(table.state == CellState.FLUID, 1.0, np.bincount(table.cell, table.share, grid.size))
-    area = np.bincount(of_piece, moments.piece_mass.sum(axis=(1, 2)), grid.size)
-    area -= np.bincount(table.cell[table.piece_region], table.piece_area, grid.size)
-    differ = np.abs(volume - 1.0 + moments.fraction) > SAME_VOLUME
-    differ |= np.abs(area) > SAME_VOLUME * _largest_faces(grid)
-    differ[table.closed_cell] = True
-    return np.flatnonzero(several & differ), ~several
-
-
-def _largest_faces(grid: Grid) -> Array:
-    """Area of the largest face of each cell."""
-    sizes = grid.cell_sizes()
-    return np.asarray(sizes.prod(axis=1) / sizes.min(axis=1))
+    return FluidParts(geometry, cell, share, region, links, special, np.flatnonzero(touching), pieces)
 
 
 def _towards(table: CutTable, geometry: Geometry) -> Array:
@@ -216,32 +181,6 @@ def _links(grid: Grid, table: CutTable, part: Indices, part_of_cell: Indices) ->
         both = (low >= 0) & (high >= 0)
         found.append(np.column_stack([low[both], high[both], np.full(int(both.sum()), axis)]))
     return np.unique(np.concatenate(found), axis=0)
-
-
-def pieces_of_regions(table: CutTable, points: Array, grid: Grid, facets: Indices, x: Array, rows: Indices) -> Pieces:
-    """Pieces of surface that bound regions of a table, sorted by region.
-
-    points: Gauss points of the table; facets, x: of its surfaces [m]; rows: among the cut cells, of each region, -1:
-    that region is left out.
-    """
-    row = rows[table.piece_region]
-    some = np.flatnonzero(row >= 0)
-    facet, moments = table.piece_facet[some], table.piece_moments[some]
-    low, size = place_of(grid, table.cell[table.piece_region[some]])
-    tensor = np.stack(np.meshgrid(*[points] * grid.dim, indexing="ij"), axis=-1).reshape(-1, grid.dim)[:, ::-1]
-    at = low[:, None] + size[:, None] * tensor
-    vertex = barycentric(x[facets[facet]], at)  # linear functions are exact on the points
-    mass = np.swapaxes(moments, 1, 2) @ vertex
-    normal = -unit_normals(x[facets])[facet]
-    return Pieces(row[some], facet, moments, 0.5 * (mass + np.swapaxes(mass, 1, 2)), normal)
-
-
-def barycentric(corners: Array, at: Array) -> Array:
-    """Barycentric coordinates of points (p, g, dim), projected into the planes of facets (p, dim, dim)."""
-    ways, way = corners[:, 1:] - corners[:, :1], at - corners[:, :1]
-    gram = ways @ np.swapaxes(ways, 1, 2)
-    found = np.swapaxes(np.linalg.solve(gram, ways @ np.swapaxes(way, 1, 2)), 1, 2)
-    return np.concatenate([1.0 - found.sum(axis=2, keepdims=True), found], axis=2)
 
 
 def grown(grid: Grid, cells: Mask, layers: int) -> Mask:
