@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, Indices
 from solvers.cut_cells import CellCutter, CellState, ClosedSurfaces
 from solvers.fluid.geometry.bodies import bodies_of
-from solvers.fluid.geometry.regions import closing_length, pieces_of_regions, touching_cells
+from solvers.fluid.geometry.regions import closing_length, pieces_of_regions, touching_cells, with_several_bodies
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import tensor_weights
 
@@ -49,12 +49,13 @@ class Unions:
         """
         grid, dim, points = self._grid, self._grid.dim, self._points
         surfaces, cutter = self._of(facets, x)
-        if not surfaces.body.any():
+        several = with_several_bodies(grid, moments, surfaces.body)
+        if tied is not None:
+            several[moments.cells[moments.piece_cell[tied[moments.piece_facet]]]] = False
+        if not several.any():
             return moments
         table = cutter.cut(x)
-        touching, _ = touching_cells(grid, moments, table, surfaces.body)
-        if tied is not None:
-            touching[moments.cells[moments.piece_cell[tied[moments.piece_facet]]]] = False
+        touching = touching_cells(grid, moments, table, several)
         row_of = np.full(grid.size, -1)
         row_of[moments.cells] = np.arange(len(moments.cells))
         row = np.where(touching & (table.state == CellState.CUT), row_of, -1)[table.cell]

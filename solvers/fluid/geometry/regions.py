@@ -23,22 +23,26 @@ def closing_length(grid: Grid) -> float:
     return float(TOUCHING * ROUNDING_OF_POSITION * max(np.abs(edge).max() for edge in grid.edges))
 
 
-def touching_cells(grid: Grid, moments, table: CutTable, body: Indices) -> tuple[Mask, Mask]:
-    """Masks of the cells (in which bodies touch or overlap, with surface of several bodies).
+def with_several_bodies(grid: Grid, moments, body: Indices) -> Mask:
+    """Mask of the cells with surface of several bodies; moments: of `kernels.moments`; body: of each facet."""
+    bodies = int(body.max(initial=0)) + 1
+    pairs = np.unique(moments.cells[moments.piece_cell] * bodies + body[moments.piece_facet])
+    return np.asarray(np.bincount(pairs // bodies, minlength=grid.size) > 1)
 
-    The union of the bodies has less volume there than they have together, or less surface, or something is closed.
-    moments: of `kernels.moments`, sums over the bodies; body: of each facet.
+
+def touching_cells(grid: Grid, moments, table: CutTable, several: Mask) -> Mask:
+    """Mask of the cells in which bodies touch or overlap, among those with several bodies.
+
+    Their union has less volume than they have together, or less surface, or something is closed.
+    moments: of `kernels.moments`, sums over the bodies.
     """
-    of_piece, bodies = moments.cells[moments.piece_cell], int(body.max(initial=0)) + 1
-    pairs = np.unique(of_piece * bodies + body[moments.piece_facet])
-    several = np.bincount(pairs // bodies, minlength=grid.size) > 1
     volume = np.where(table.state == CellState.FLUID, 1.0, np.bincount(table.cell, table.share, grid.size))
-    area = np.bincount(of_piece, moments.piece_mass.sum(axis=(1, 2)), grid.size)
+    area = np.bincount(moments.cells[moments.piece_cell], moments.piece_mass.sum(axis=(1, 2)), grid.size)
     area -= np.bincount(table.cell[table.piece_region], table.piece_area, grid.size)
     differ = np.abs(volume - 1.0 + moments.fraction) > SAME_VOLUME
     differ |= np.abs(area) > SAME_VOLUME * largest_faces(grid)
     differ[table.closed_cell] = True
-    return several & differ, several
+    return np.asarray(several & differ)
 
 
 def largest_faces(grid: Grid) -> Array:

@@ -13,7 +13,13 @@ from solvers.api import Array, Indices, Mask
 from solvers.cut_cells import CellState, ClosedSurfaces, CutTable, components_of, cut_cells
 from solvers.fluid.geometry.bodies import bodies_of
 from solvers.fluid.geometry.pieces import NOTHING, place_of
-from solvers.fluid.geometry.regions import SAME_VOLUME, closing_length, largest_faces, touching_cells
+from solvers.fluid.geometry.regions import (
+    SAME_VOLUME,
+    closing_length,
+    largest_faces,
+    touching_cells,
+    with_several_bodies,
+)
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import gauss
 from solvers.mesh.lagrange import lagrange
@@ -129,7 +135,8 @@ def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts
     table, fluid = geometry.table(3), 1.0 - moments.fraction
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True
-    touching, several = touching_cells(grid, moments, table, geometry.surfaces.body)
+    several = with_several_bodies(grid, moments, geometry.surfaces.body)
+    touching = np.flatnonzero(touching_cells(grid, moments, table, several))
     total = np.bincount(table.cell, table.share, grid.size)
     with_surface = np.zeros(grid.size, dtype=bool)
     with_surface[moments.cells[moments.piece_cell]] = True
@@ -158,7 +165,7 @@ def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts
     pieces = np.concatenate([pieces, np.stack([rest, moments.piece_facet[in_unknown]], axis=1)])
     pieces = np.unique(pieces[pieces[:, 0] >= 0], axis=0)
     links = _links(grid, table, part, part_of_cell)
-    return FluidParts(geometry, cell, share, region, links, special, np.flatnonzero(touching), pieces)
+    return FluidParts(geometry, cell, share, region, links, special, touching, pieces)
 
 
 def _towards(table: CutTable, geometry: Geometry) -> Array:
