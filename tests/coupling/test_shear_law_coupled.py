@@ -5,7 +5,7 @@ import pytest
 from coupled_case import POST
 from programs import fsci
 
-from fsci.case import load_case
+from fsci.case import CaseError, load_case
 from fsci.running.history import read_history
 from fsci.running.run import FINISHED, run_case
 
@@ -57,3 +57,9 @@ def test_two_processes_agree(thinning, tmp_path):
     found = read_history(tmp_path / "two" / "history.csv")
     for name in NAMES:
         assert np.abs(found[name] - thinning[name]).max() < 1e-7 * np.abs(thinning[name]).max()
+
+
+def test_seepage_through_closed_contact_is_refused(tmp_path):
+    (tmp_path / "case.yaml").write_text(THINNING + "contact: {film: {transmissivity: 1.0e-7}}\n")
+    with pytest.raises(CaseError, match="seepage through closed contact needs a constant viscosity: remove 'shear'"):
+        load_case(tmp_path / "case.yaml")
