@@ -234,9 +234,7 @@ class FluidSection(Section):
 
     density: Positive = setting(..., "mass per volume", unit="kg/m^3")
     viscosity: Positive = setting(..., "dynamic viscosity", unit="Pa s")
-    shear: ShearSection | None = setting(
-        None, "how the viscosity depends on the shear rate; default: it is constant; in flows without bodies"
-    )
+    shear: ShearSection | None = setting(None, "how the viscosity depends on the shear rate; default: it is constant")
     flow: Literal["navier_stokes", "stokes"] = setting(
         "navier_stokes", "stokes: creeping flow, without the convective term"
     )

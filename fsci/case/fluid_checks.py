@@ -22,7 +22,12 @@ def fluid_mistakes(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
     for name in ("gravity", "body_force", "initial_velocity"):
         yield from length_mistakes(getattr(fluid, name), dimension, ("fluid", name))
     if fluid.shear is not None and fluid.narrow_gaps:
-        yield ("fluid", "narrow_gaps"), "is for a constant viscosity"
+        yield ("fluid", "narrow_gaps"), "'narrow_gaps' is for a constant viscosity"
+    if fluid.shear is not None and case.contact is not None and case.contact.film.closed == "seeping":
+        yield (
+            ("contact", "film"),
+            "seepage through closed contact needs a constant viscosity: remove 'shear' of the fluid",
+        )
     yield from _patches(fluid)
     yield from _refinements(case, fluid)
     for name, body in fluid.bodies.items():

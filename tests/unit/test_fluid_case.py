@@ -36,9 +36,9 @@ MISTAKES = [
     ("density: 1.2", "density: -1", "4:12: 'density' must be greater than 0, not -1", "-1"),
     (
         "density: 1.2",
-        "density: 1\n  shear: {law: carreau, infinite: 0, time: 1, exponent: 0.5}",
-        "5:10: with bodies in the flow the viscosity must be constant",
-        "{law",
+        "density: 1\n  narrow_gaps: true\n  shear: {law: carreau, infinite: 0, time: 1, exponent: 0.5}",
+        "5:16: 'narrow_gaps' is for a constant viscosity",
+        "true",
     ),
     (
         "density: 1.2",

@@ -24,19 +24,18 @@ class CellViscosity:
 
     def __init__(self, unknowns: Unknowns, settings: FlowSettings):
         self._unknowns, self._settings, domain = unknowns, settings, unknowns.grid.domain
-        self._function = None if settings.shear is None else fem.function(fem.cellwise_space(domain))
+        space = fem.cellwise_space(domain)
+        self._function, self._of_scales = (None if settings.shear is None else fem.function(space) for _ in range(2))
         _, slopes = fem.tabulate_lagrange(domain, settings.degree, np.full((1, unknowns.dim), 0.5))
         self._slopes: Array = slopes[0]
-        if self._function is not None:
-            self._function.x.array[:] = settings.viscosity
 
     def on_cut(self, flow: Coefficients) -> Coefficients:
         """The coefficients in cut cells."""
         return flow if self._function is None else replace(flow, mu=self._function, shear=None)
 
     def on_faces(self, flow: Coefficients) -> Coefficients:
-        """The coefficients on faces between cells."""
-        return flow if self._function is None else replace(flow, mu=avg(self._function), shear=None)
+        """The coefficients on faces between cells: those of `set_scales`, which iterates do not change."""
+        return flow if self._of_scales is None else replace(flow, mu=avg(self._of_scales), shear=None)
 
     def of(self, cells: Indices32) -> Array | float:
         """mu [Pa s] of local cells."""
@@ -49,13 +48,23 @@ class CellViscosity:
         """Take the viscosity of a flow at local dofs; whether it has changed on any process (collective)."""
         if self._function is None:
             return False
+        new, before = self._by_cell(flow), self._function.x.array
+        changed = not np.array_equal(new, before)
+        before[:] = new
+        return bool(self._unknowns.grid.comm.allreduce(changed, op=MPI.LOR))
+
+    def set_scales(self, velocity: Array) -> None:
+        """Set the viscosity that scales penalties on faces to that of a velocity [m/s] at local dofs."""
+        if self._of_scales is not None:
+            self._of_scales.x.array[:] = self._by_cell(velocity)
+
+    def _by_cell(self, flow: Array) -> Array:
+        """mu [Pa s] in the middle of each local cell."""
         mu, law, grid = self._settings.viscosity, self._settings.shear, self._unknowns.grid
         assert law is not None
         gradient = self._slopes / grid.sizes[:, None]
         slope = np.swapaxes(flow[self._unknowns.cell_velocity], 1, 2) @ gradient
         square = 0.5 * ((slope + np.swapaxes(slope, 1, 2)) ** 2).sum(axis=(1, 2))
         power = (1.0 + law.time**2 * square) ** (0.5 * (law.exponent - 1.0))
-        new = law.infinite + (mu - law.infinite) * power
-        changed = not np.array_equal(new, self._function.x.array)
-        self._function.x.array[:] = new
-        return bool(grid.comm.allreduce(changed, op=MPI.LOR))
+        found: Array = law.infinite + (mu - law.infinite) * power
+        return found

@@ -147,6 +147,7 @@ class FlowSystem:
         """Set the velocity a [m/s], at local dofs, that scales stabilisation and penalties (collective)."""
         settings, unknowns = self.settings, self.unknowns
         self._scale_velocity.x.array[:], self._current = velocity, False
+        self.viscosity.set_scales(velocity)
         speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
         by_dof = np.zeros(unknowns.local)
         by_dof[unknowns.velocity.dofs[:, 0]] = speed
@@ -369,8 +370,7 @@ class FlowSystem:
         rows, flow, penalty = self._out[:owned], self.flow.x.array[:owned], self.matrix.penalty
         if self._hanging is not None:
             rows = self._hanging.table.rows(rows)
-        rows = rows + self.outlets.rows(flow)
-        return rows if penalty is None else rows + penalty.times(flow)
+        return rows + self.outlets.rows(flow) + (0.0 if penalty is None else penalty.times(flow))
 
     def tangent(self, identity: NDArray[np.bool_], *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow) without `outlets.product`; the next call overwrites it.
