@@ -218,9 +218,7 @@ def test_two_processes(text, scheme, tmp_path):
         assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, name
 
 
-def test_files_and_pictures(monolithic):
-    from PIL import Image
-
+def test_files(monolithic):
     out, history = monolithic
     flow, post = (read_collection(out / "fields" / f"{name}.pvd") for name in ("fluid", "post"))
     assert len(flow) == len(post) == len(history["time"]) + 1
@@ -232,6 +230,13 @@ def test_files_and_pictures(monolithic):
     assert mesh.point_data["displacement"][tip, 0] > 1e-3
     area = pyvista.read(flow[-1][1]).cell_data["fluid_fraction"].sum() * 0.01
     assert area == pytest.approx(2.0 - 0.23 * 0.41, rel=0.02)
+
+
+@pytest.mark.slow
+def test_pictures(monolithic):
+    from PIL import Image
+
+    out, _ = monolithic
     pictures = plot_run(out)
     assert {"final_velocity.png", "final_pressure.png"} <= {path.name for path in pictures}
     pixels = np.asarray(Image.open(out / "pictures" / "final_velocity.png").convert("RGB")).astype(int)

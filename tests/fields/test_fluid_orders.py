@@ -121,6 +121,7 @@ def test_beltrami_flow_around_a_sphere_second_order():
     assert np.all(rates(found)[0] >= BARS["q2q1"]), (found, rates(found))
 
 
+@pytest.mark.slow
 def test_errors_and_iterations_do_not_depend_on_the_position_3d():
     """A sphere is shifted through one cell in twenty steps."""
     cells = 8

@@ -37,8 +37,15 @@ def go_on(structure, t, step, end):
     return t, None
 
 
-@pytest.mark.parametrize("step", [0.025, 0.0125])
-@pytest.mark.parametrize("length", [1e-3, 1.0])
+@pytest.mark.parametrize(
+    ("step", "length"),
+    [
+        (0.025, 1.0),
+        (0.0125, 1e-3),
+        pytest.param(0.025, 1e-3, marks=pytest.mark.slow),
+        pytest.param(0.0125, 1.0, marks=pytest.mark.slow),
+    ],
+)
 def test_a_plate_on_an_arch(step, length):
     """Pressed down to 0.2 of its rise a shallow arch buckles to one side under the plate."""
     held = [Support(end, vector(0, 0)) for end in ("start", "end")]

@@ -46,7 +46,10 @@ def write(folder, text: str = SINKING):
     return path
 
 
-@pytest.mark.parametrize("scheme", ["{scheme: monolithic}", "{scheme: partitioned, tolerance: 1.0e-9}"])
+@pytest.mark.parametrize(
+    "scheme",
+    ["{scheme: monolithic}", pytest.param("{scheme: partitioned, tolerance: 1.0e-9}", marks=pytest.mark.slow)],
+)
 def test_run_and_resume(tmp_path, scheme):
     """It sinks and turns; a run that stopped halfway ends with the same numbers, bit for bit."""
     path = write(tmp_path, SINKING.replace("{scheme: monolithic}", scheme))

@@ -135,10 +135,11 @@ def test_a_block_tips_where_it_must(push):
         assert corner == pytest.approx([0.0, 0.0], abs=1e-7)
 
 
-def test_a_disc_rolls_down_a_slope():
+@pytest.mark.parametrize("finest", [192, pytest.param(384, marks=pytest.mark.slow)])
+def test_a_disc_rolls_down_a_slope(finest):
     """2/3 g sin a for a disc; a polygon of n sides loses energy at each corner: the error falls with 1 / n."""
     angle, errors = 0.3, []
-    for n in (96, 192, 384):
+    for n in (finest // 2, finest):
         body = disc("disc", (0.0, 0.5 * np.cos(np.pi / n)), n=n, turned=np.pi / n - np.pi / 2, gravity=slope(angle))
         bodies = field([body], [RigidPair(0, FLOOR, 0.5)])
         for _ in march(bodies, 0.8, 80):
@@ -148,8 +149,7 @@ def test_a_disc_rolls_down_a_slope():
         turned = np.arctan2(bodies.now[0].R[0, 1], bodies.now[0].R[0, 0])
         assert 0.5 * turned == pytest.approx(bodies.now[0].shift[0], rel=1e-3)
     assert abs(errors[1]) < 0.55 * abs(errors[0])
-    assert abs(errors[2]) < 0.55 * abs(errors[1])
-    assert abs(errors[2]) < 0.005
+    assert finest < 384 or abs(errors[1]) < 0.005
 
 
 def test_a_ball_rolls_down_a_slope():

@@ -88,7 +88,7 @@ def test_dynamics_with_damping():
 def small_stress(material, gradient):
     """Cauchy stress of a small homogeneous deformation."""
     dim = len(gradient)
-    structure = make_structure(block("quad" if dim == 2 else "hexahedron", 1), material)
+    structure = make_structure(block("quad" if dim == 2 else "tetra", 1), material)
     body = structure.bodies[0]
     body.set_displacement((body.points[:dim, : body.owned].T @ np.asarray(gradient).T).ravel())
     return body.stress()[0].reshape(3, 3)
