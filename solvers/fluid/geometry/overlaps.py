@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, Indices
 from solvers.cut_cells import CellCutter, CellState, ClosedSurfaces
-from solvers.fluid.geometry.bodies import bodies_of
+from solvers.fluid.geometry.bodies import closed_surfaces, without_fans
 from solvers.fluid.geometry.regions import closing_length, pieces_of_regions, touching_cells, with_several_bodies
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import tensor_weights
@@ -54,7 +54,7 @@ class Unions:
             several[moments.cells[moments.piece_cell[tied[moments.piece_facet]]]] = False
         if not several.any():
             return moments
-        table = cutter.cut(x)
+        table = without_fans(cutter.cut(x), len(facets))
         touching = touching_cells(grid, moments, table, several)
         row_of = np.full(grid.size, -1)
         row_of[moments.cells] = np.arange(len(moments.cells))
@@ -79,8 +79,8 @@ class Unions:
     def _of(self, facets: Indices, x: Array) -> tuple[ClosedSurfaces, CellCutter]:
         """The surfaces, with the bodies that they bound, and what cuts cells by them."""
         surfaces, cutter = self._surfaces, self._cutter
-        if surfaces is None or cutter is None or not np.array_equal(surfaces.facets, facets):
-            surfaces = ClosedSurfaces(facets, bodies_of(facets, x))
+        if surfaces is None or cutter is None or not np.array_equal(surfaces.facets[: len(facets)], facets):
+            surfaces = closed_surfaces(facets, x)
             closing = closing_length(self._grid)
             cutter = CellCutter(self._grid.edges, self._points, surfaces, closing=closing)
             self._surfaces, self._cutter = surfaces, cutter
