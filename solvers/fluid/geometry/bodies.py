@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import pairwise
-
 import numpy as np
 
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
-from solvers.cut_cells import ClosedSurfaces, CutTable
+from solvers.cut_cells import ClosedSurfaces
 from solvers.mesh.penetration import windings
-
-PIECE_COLUMNS = ("piece_region", "piece_facet", "piece_body", "piece_moments")
-CLOSED_COLUMNS = ("closed_cell", "closed_facet", "closed_moments")
 
 
 def bodies_of(facets: Indices, x: Array) -> Indices:
@@ -37,57 +31,12 @@ def bodies_of(facets: Indices, x: Array) -> Indices:
     return np.unique(body_of, return_inverse=True)[1][body]
 
 
-def closed_surfaces(facets: Indices, x: Array) -> ClosedSurfaces:
-    """Surfaces of bodies, closed by facets without area where vertices lie in edges of others, at the end.
+def closed_surfaces(facets: Indices, x: Array) -> ClosedSurfaces | None:
+    """Surfaces of bodies; None if one is open: facets that are divided at a tie have vertices in edges of others.
 
-    facets, x: as for `bodies_of`. ValueError where a surface is open.
+    facets, x: as for `bodies_of`.
     """
-    body = bodies_of(facets, x)
-    more = _fans(facets, x) if facets.shape[1] == 3 else facets[:0]
-    if not len(more):
-        return ClosedSurfaces(facets, body)
-    of_vertex = np.full(len(x), -1)
-    of_vertex[facets] = body[:, None]
-    return ClosedSurfaces(np.concatenate([facets, more]), np.concatenate([body, of_vertex[more[:, 0]]]))
-
-
-def without_fans(table: CutTable, facets: int) -> CutTable:
-    """The table without pieces of the facets that `closed_surfaces` added to so many."""
-    pieces, closed = table.piece_facet < facets, table.closed_facet < facets
-    if pieces.all() and closed.all():
-        return table
-    rows = {name: getattr(table, name)[pieces] for name in PIECE_COLUMNS}
-    return replace(table, **rows, **{name: getattr(table, name)[closed] for name in CLOSED_COLUMNS})
-
-
-def _fans(triangles: Indices, x: Array) -> Indices:
-    """Triangles that fill loops of edges which belong to facets on one side only, shape (n, 3)."""
-    ends = np.stack([triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()], axis=1)
-    edges, number = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    excess = np.bincount(number.ravel(), np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0), len(edges)).astype(int)
-    following: dict[int, list[int]] = {}
-    for (low, high), count in zip(edges[excess != 0].tolist(), excess[excess != 0].tolist(), strict=True):
-        start, end = (high, low) if count > 0 else (low, high)
-        following.setdefault(start, []).extend([end] * abs(count))
-    found = []
-    while following:
-        start = min(following)
-        path = [start]
-        while following.get(path[-1]):
-            ahead = following[path[-1]]
-            path.append(ahead.pop(_straightest(x, path, ahead)))
-            if path[-1] in path[:-1]:  # a loop is closed
-                first = path.index(path[-1])
-                found += [(path[first], a, b) for a, b in pairwise(path[first + 1 : -1])]
-                path = path[: first + 1]
-        following = {vertex: ends for vertex, ends in following.items() if ends}
-    return np.array(found, dtype=np.int64).reshape(-1, 3)
-
-
-def _straightest(x: Array, path: list[int], ahead: list[int]) -> int:
-    """Which of some vertices is nearest to the line through the last two of a path."""
-    if len(path) < 2 or len(ahead) == 1:
-        return 0
-    along = x[path[-1]] - x[path[-2]]
-    ways = x[ahead] - x[path[-1]]
-    return int(np.argmin(np.linalg.norm(np.cross(ways, along), axis=1) / np.linalg.norm(ways, axis=1)))
+    try:
+        return ClosedSurfaces(facets, bodies_of(facets, x))
+    except ValueError:
+        return None

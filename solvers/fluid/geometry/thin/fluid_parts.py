@@ -11,7 +11,6 @@ from scipy import ndimage
 
 from solvers.api import Array, Indices, Mask
 from solvers.cut_cells import CellState, ClosedSurfaces, CutTable, components_of, cut_cells
-from solvers.fluid.geometry.bodies import closed_surfaces, without_fans
 from solvers.fluid.geometry.pieces import NOTHING, place_of
 from solvers.fluid.geometry.regions import (
     SAME_VOLUME,
@@ -40,8 +39,7 @@ class Geometry:
     """A grid and closed surfaces in it, and its tables."""
 
     grid: Grid
-    facets: Indices
-    surfaces: ClosedSurfaces  #: of these facets
+    surfaces: ClosedSurfaces
     x: Array  #: vertices [m]
 
     @cached_property
@@ -51,8 +49,7 @@ class Geometry:
 
     def cut(self, edges: Sequence[Array], count: int) -> CutTable:
         """The table of these grid lines."""
-        table = cut_cells(edges, gauss(count)[0], self.surfaces, self.x, closing=closing_length(self.grid))
-        return without_fans(table, len(self.facets))
+        return cut_cells(edges, gauss(count)[0], self.surfaces, self.x, closing=closing_length(self.grid))
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,7 @@ class FluidParts:
     def facing(self) -> Array:
         """Mean unit normal of the facets in each part, shape (parts, dim); nan without facets."""
         part, facet = self.pieces.T
-        normals = unit_normals(self.geometry.x[self.geometry.facets])
+        normals = unit_normals(self.geometry.x[self.geometry.surfaces.facets])
         total = np.zeros((len(self.cell), normals.shape[1]))
         np.add.at(total, part, normals[facet])
         total /= np.maximum(np.linalg.norm(total, axis=1), SAME_VOLUME)[:, None]
@@ -127,13 +124,13 @@ class FluidParts:
         return min(bounding, key=lambda k: len(bounding[k] ^ around), default=-1)
 
 
-def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts:
-    """Parts of the fluid around facets (m, dim) with vertices at x [m].
+def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> FluidParts:
+    """Parts of the fluid around surfaces with vertices at x [m].
 
     moments: of `kernels.moments`; cells that these count as solid, without surface, have no parts.
     Where one body overlaps itself its regions are not known, and all fluid of the cell is one part.
     """
-    geometry = Geometry(grid, facets, closed_surfaces(facets, x), x)
+    geometry = Geometry(grid, surfaces, x)
     table, fluid = geometry.table(3), 1.0 - moments.fraction
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True
@@ -172,7 +169,7 @@ def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts
 
 def _towards(table: CutTable, geometry: Geometry) -> Array:
     """int n ds over the surface of each region along `OBLIQUE_DIRECTION`, which orders the parts of a cell."""
-    normal = unit_normals(geometry.x[geometry.facets])
+    normal = unit_normals(geometry.x[geometry.surfaces.facets])
     along = normal[table.piece_facet] @ OBLIQUE_DIRECTION[: normal.shape[1]]
     return np.asarray(np.bincount(table.piece_region, table.piece_area * along, len(table.cell) + 1), dtype=float)
 
