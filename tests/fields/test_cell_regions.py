@@ -6,6 +6,7 @@ from fluid_setup import block, sphere
 from thin_space import turn
 
 from solvers import kernels
+from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.thin.fluid_parts import parts_of_fluid
 from solvers.fluid.grid.box import Grid, uniform
 from solvers.mesh.gauss import gauss
@@ -19,7 +20,7 @@ def found_in(grid, points, facets):
     """(parts of the fluid that the surface bounds, moments of the kernel)."""
     wanted = np.ones(grid.size, dtype=bool)
     moments = kernels.moments(grid.edges, POINTS, np.ascontiguousarray(points), facets, wanted)
-    return parts_of_fluid(grid, moments, facets, points), moments
+    return parts_of_fluid(grid, moments, closed_surfaces(facets, points), points), moments
 
 
 def bodies(kind, thickness):

@@ -6,6 +6,7 @@ import numpy as np
 
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
+from solvers.cut_cells import ClosedSurfaces
 from solvers.mesh.penetration import windings
 
 
@@ -28,3 +29,14 @@ def bodies_of(facets: Indices, x: Array) -> Indices:
         if outer:
             body_of[cavity] = min(outer, key=lambda k: volume[k])
     return np.unique(body_of, return_inverse=True)[1][body]
+
+
+def closed_surfaces(facets: Indices, x: Array) -> ClosedSurfaces | None:
+    """Surfaces of bodies; None if one is open: facets that are divided at a tie have vertices in edges of others.
+
+    facets, x: as for `bodies_of`.
+    """
+    try:
+        return ClosedSurfaces(facets, bodies_of(facets, x))
+    except ValueError:
+        return None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, Indices
 from solvers.cut_cells import CellCutter, CellState, ClosedSurfaces
-from solvers.fluid.geometry.bodies import bodies_of
+from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.regions import closing_length, pieces_of_regions, touching_cells, with_several_bodies
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import tensor_weights
@@ -38,17 +38,19 @@ class Unions:
 
     def __init__(self, grid: Grid, points: Array):
         self._grid, self._points = grid, points
-        self._surfaces: ClosedSurfaces | None = None
-        self._cutter: CellCutter | None = None
+        self._facets: Indices | None = None
+        self._found: tuple[ClosedSurfaces, CellCutter] | None = None
 
     def __call__(self, moments, facets: Indices, x: Array, tied: NDArray[np.bool_] | None):
         """Moments with the union of the bodies as solid, in cells with fluid where they overlap.
 
-        moments: of `kernels.moments`, which are returned where nothing overlaps; x: vertices [m]; tied: facets that
-        are tied, in whose cells nothing overlaps; None: no one is.
+        moments: of `kernels.moments`, which are returned where nothing overlaps or a surface is open; x: vertices [m];
+        tied: facets that are tied, in whose cells nothing overlaps; None: no one is.
         """
         grid, dim, points = self._grid, self._grid.dim, self._points
-        surfaces, cutter = self._of(facets, x)
+        if (found := self._of(facets, x)) is None:
+            return moments
+        surfaces, cutter = found
         several = with_several_bodies(grid, moments, surfaces.body)
         if tied is not None:
             several[moments.cells[moments.piece_cell[tied[moments.piece_facet]]]] = False
@@ -76,12 +78,11 @@ class Unions:
         )
         return Moments(fraction, moments.cells, solid, *(np.concatenate([old[kept], more]) for old, more in pairs))
 
-    def _of(self, facets: Indices, x: Array) -> tuple[ClosedSurfaces, CellCutter]:
-        """The surfaces, with the bodies that they bound, and what cuts cells by them."""
-        surfaces, cutter = self._surfaces, self._cutter
-        if surfaces is None or cutter is None or not np.array_equal(surfaces.facets, facets):
-            surfaces = ClosedSurfaces(facets, bodies_of(facets, x))
-            closing = closing_length(self._grid)
-            cutter = CellCutter(self._grid.edges, self._points, surfaces, closing=closing)
-            self._surfaces, self._cutter = surfaces, cutter
-        return surfaces, cutter
+    def _of(self, facets: Indices, x: Array) -> tuple[ClosedSurfaces, CellCutter] | None:
+        """The surfaces, with the bodies that they bound, and what cuts cells by them; None where one is open."""
+        if self._facets is None or not np.array_equal(self._facets, facets):
+            self._facets, self._found = facets, None
+            if (surfaces := closed_surfaces(facets, x)) is not None:
+                closing = closing_length(self._grid)
+                self._found = surfaces, CellCutter(self._grid.edges, self._points, surfaces, closing=closing)
+        return self._found

@@ -11,7 +11,6 @@ from scipy import ndimage
 
 from solvers.api import Array, Indices, Mask
 from solvers.cut_cells import CellState, ClosedSurfaces, CutTable, components_of, cut_cells
-from solvers.fluid.geometry.bodies import bodies_of
 from solvers.fluid.geometry.pieces import NOTHING, place_of
 from solvers.fluid.geometry.regions import (
     SAME_VOLUME,
@@ -125,13 +124,13 @@ class FluidParts:
         return min(bounding, key=lambda k: len(bounding[k] ^ around), default=-1)
 
 
-def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array) -> FluidParts:
-    """Parts of the fluid around facets (m, dim) with vertices at x [m].
+def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> FluidParts:
+    """Parts of the fluid around surfaces with vertices at x [m].
 
     moments: of `kernels.moments`; cells that these count as solid, without surface, have no parts.
     Where one body overlaps itself its regions are not known, and all fluid of the cell is one part.
     """
-    geometry = Geometry(grid, ClosedSurfaces(facets, bodies_of(facets, x)), x)
+    geometry = Geometry(grid, surfaces, x)
     table, fluid = geometry.table(3), 1.0 - moments.fraction
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True

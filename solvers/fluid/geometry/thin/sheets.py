@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 from solvers import kernels
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices, Mask
+from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.pieces import off_boundary, without_slivers
 from solvers.fluid.geometry.thin.closing import are_apart, closed_at, may_touch, uncut_cells
 from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND, FluidParts, grown, parts_of_fluid, ragged
@@ -247,9 +248,11 @@ def find_sheets(
     may_close &= are_apart(grid, uncut_cells(grid, moments))
     if not (may_part or may_close):
         return None
+    if (surfaces := closed_surfaces(facets, x)) is None:
+        return None
     if tied is not None:
         moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
-    parts = parts_of_fluid(grid, moments, facets, x)
+    parts = parts_of_fluid(grid, moments, surfaces, x)
     cells, links, special = parts.cell, parts.links, parts.special
     if not len(cells) and not always:  # all surfaces are outside of the box
         return None
@@ -317,7 +320,9 @@ def closed_way(grid: Grid, facets: Indices, x: Array) -> Array:
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     if not are_apart(grid, uncut_cells(grid, moments)):
         return np.empty((0, grid.dim))
-    parts = parts_of_fluid(grid, moments, facets, x)
+    if (surfaces := closed_surfaces(facets, x)) is None:
+        return np.empty((0, grid.dim))
+    parts = parts_of_fluid(grid, moments, surfaces, x)
     return closed_at(grid, moments, parts.cell, parts.links)
 
 
