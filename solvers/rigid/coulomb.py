@@ -167,6 +167,20 @@ def solver(K: Sparse) -> Callable[[Array], Array]:
     return splu(csc_matrix((turned.data, turned.indices, turned.indptr), shape=K.shape)).solve
 
 
+def positive_definite(K: Sparse) -> bool:
+    """Whether the symmetric part of K is, by the signs of its pivots; then one motion belongs to the forces f."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    half = csc_matrix((K.data, K.indices, K.indptr), shape=K.shape)
+    lower = {"SymmetricMode": True}
+    try:
+        factors = splu(half + half.T, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=lower)
+    except RuntimeError:  # singular
+        return False
+    return bool((factors.perm_r == factors.perm_c).all() and (factors.U.diagonal() > 0.0).all())
+
+
 def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | None = None) -> tuple[Array, Array]:
     """(u, z) of shapes (n,) and (m, dim). start: z of a problem nearby.
 
