@@ -56,7 +56,11 @@ def build_rigid_contact(
         if frozenset((bodies[one].name, bodies[other].name)) not in case.joined
     ]
     others: list[Obstacle | RigidWall] = [*_immersed(given), *_obstacles(case, comm), *_walls(case)]
-    pairs += [RigidPair(index, other, friction(bodies[index].name, other.name)) for index in range(len(bodies)) for other in others]
+    pairs += [
+        RigidPair(index, other, friction(bodies[index].name, other.name))
+        for index in range(len(bodies))
+        for other in others
+    ]
     pairs = [pair for pair in pairs if not _overlaps(bodies, pair, t)]
     restitution = 0.0 if settings is None else settings.restitution
     standoff = 0.0 if case.fluid is None else STANDOFF * float(case.fluid.grid.smallest.min())

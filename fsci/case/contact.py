@@ -138,8 +138,8 @@ class PairSection(Section):
         where, slave = self.sides[0]
         if slave.obstacle is not None:
             raise fault(
-                "the slave must be a surface of a body: make the obstacle the master; friction of two rigid bodies is in"
-                " 'rigid_pairs'",
+                "the slave must be a surface of a body: make the obstacle the master; friction of two rigid bodies is"
+                " in 'rigid_pairs'",
                 where,
             )
         if self.tied and self.friction is not None and self.friction.some:
@@ -180,7 +180,8 @@ class RigidPairSection(Section):
     """Two that may touch, of which one at least is a free rigid body: how they do it."""
 
     bodies: Annotated[tuple[Name, ...], EntryCount(2, 2)] = setting(
-        ..., "two names: of free rigid bodies, or one of these and a body of given motion, an obstacle, or a closed patch"
+        ...,
+        "two names: free rigid bodies, or one of these and a body of given motion, an obstacle, or a closed patch",
     )
     friction: Annotated[Friction, OrNone(Friction())] = setting(..., "friction law by its coefficient, or none")
 

@@ -13,7 +13,7 @@ from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
 
 
 def rigid_pair_mistakes(case: Case, contact: ContactSection) -> Iterator[Mistake]:
-    """Names that are no rigid bodies, pairs without a free one, pairs that are given twice, laws of elastic surfaces."""
+    """Names of no rigid bodies, pairs without a free one, pairs that are given twice, laws of elastic surfaces."""
     free = case.rigid or {}
     if contact.rigid_pairs and not free:
         yield ("contact", "rigid_pairs"), "'rigid_pairs' is for free rigid bodies, which this case has not"

@@ -94,7 +94,7 @@ def test_with_a_wall_of_a_flow(tmp_path, scheme):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[lower, upper]", "[lower, uper]", "there is no rigid body, obstacle or closed patch 'uper'; did you mean 'upper'?"),
+        ("[lower, upper]", "[uper, lower]", "no rigid body, obstacle or closed patch 'uper'; did you mean 'upper'?"),
         ("[lower, upper]", "[lower, lower]", "give two different names: a rigid body does not touch itself"),
         ("[lower, upper]", "[lower]", "must have 2 entries, not 1"),
         ("[lower, upper]", "[alone, floor]", "'slippery' is a pair of the same two: remove one of them"),
@@ -103,7 +103,10 @@ def test_with_a_wall_of_a_flow(tmp_path, scheme):
     ],
 )  # fmt: skip
 def test_mistakes_of_rigid_pairs(tmp_path, old, new, message):
-    text = BLOCKS.replace(old, new).replace("obstacles: {", "obstacles: {wall: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1], origin: [20, 0]}}, ")
+    text = BLOCKS.replace(old, new).replace(
+        "obstacles: {",
+        "obstacles: {wall: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1], origin: [20, 0]}}, ",
+    )
     with pytest.raises(CaseError) as error:
         load_case(written(tmp_path, text))
     assert message in str(error.value)
@@ -113,7 +116,8 @@ def test_mistakes_of_rigid_pairs(tmp_path, old, new, message):
 def test_without_free_bodies(tmp_path):
     text = WALLS.replace("free: {density: 3, held: [rotation]}", "slip_length: 0").replace("coupling: {}\n", "")
     text = text.replace("contact: {friction: {coefficient: 0.3}, ", "contact: {") + (
-        "structure: {bodies: {plate: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}, material: {law: neo_hooke, E: 1, nu: 0.3}}}}\n"
+        "structure: {bodies: {plate: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]},"
+        " material: {law: neo_hooke, E: 1, nu: 0.3}}}}\n"
         "coupling: {}\n"
     )
     with pytest.raises(CaseError, match="'rigid_pairs' is for free rigid bodies, which this case has not"):
