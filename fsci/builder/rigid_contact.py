@@ -79,7 +79,10 @@ class _Friction:
         if settings is None:
             return cls(0.0, {})
         default = settings.friction or Friction()
-        own = {frozenset(pair.bodies): pair.friction.coefficient or 0.0 for pair in settings.rigid_pairs.values()}
+        own = {
+            frozenset(pair.bodies): (pair.friction or Friction()).coefficient or 0.0
+            for pair in settings.rigid_pairs.values()
+        }
         return cls(default.coefficient or 0.0, own)
 
     def __call__(self, one: str, other: str) -> float:

@@ -183,7 +183,9 @@ class RigidPairSection(Section):
         ...,
         "two names: free rigid bodies, or one of these and a body of given motion, an obstacle, or a closed patch",
     )
-    friction: Annotated[Friction, OrNone(Friction())] = setting(..., "friction law by its coefficient, or none")
+    friction: Annotated[Friction | None, OrNone(Friction())] = setting(
+        None, "friction law by its coefficient, or none; default: none"
+    )
 
 
 class FilmSection(Section):

@@ -40,7 +40,7 @@ def rigid_pair_mistakes(case: Case, contact: ContactSection) -> Iterator[Mistake
         if both in seen:
             yield (*keys, "bodies"), f"'{seen[both]}' is a pair of the same two: remove one of them"
         seen.setdefault(both, name)
-        if pair.friction.bound is not None:
+        if pair.friction is not None and pair.friction.bound is not None:
             yield (*keys, "friction", "bound"), "rigid bodies have Coulomb's friction: give 'coefficient'"
 
 
