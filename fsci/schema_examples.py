@@ -109,6 +109,7 @@ EXAMPLES = {
     "\n  fold: {self: {body: strip, on: inside}}",
     "Side": "slave: {body: ball, on: outer}",
     "Friction": "friction: {coefficient: 0.3}",
+    "RigidPair": "rigid_pairs:\n  slippery: {bodies: [ball, floor], friction: {coefficient: 0.1}}",
     "Film": "film: {roughness: 1e-5}",
     "Obstacle": 'obstacles:\n  stamp: {mesh: {file: stamp.geo}, on: face, motion: [0, 0, "-0.1*t"]}',
     "Probe": "probes:\n  tip: {quantity: displacement, at: [1, 0.05]}\n  clamp: {quantity: reaction, on: left}\n"

@@ -5,7 +5,8 @@ Bodies do not pass each other, except those that a spring without length joins. 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 
@@ -17,6 +18,7 @@ from fsci.builder.closed_faces import closed_faces
 from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.on_first import shared
 from fsci.case import Case
+from fsci.case.contact import ContactSection, Friction
 from fsci.meshes.of_case import read_obstacle
 from solvers.fluid.surfaces.immersed import ImmersedBody
 from solvers.fluid.surfaces.surface import Motion
@@ -47,18 +49,44 @@ def build_rigid_contact(
         return None
     t = case.time.start
     settings = case.contact
-    friction = settings.friction.coefficient or 0.0 if settings is not None and settings.friction is not None else 0.0
+    friction = _Friction.of(settings)
     pairs = [
-        RigidPair(one, other, friction)
+        RigidPair(one, other, friction(bodies[one].name, bodies[other].name))
         for one, other in combinations(range(len(bodies)), 2)
         if frozenset((bodies[one].name, bodies[other].name)) not in case.joined
     ]
     others: list[Obstacle | RigidWall] = [*_immersed(given), *_obstacles(case, comm), *_walls(case)]
-    pairs += [RigidPair(index, other, friction) for index in range(len(bodies)) for other in others]
+    pairs += [
+        RigidPair(index, other, friction(bodies[index].name, other.name))
+        for index in range(len(bodies))
+        for other in others
+    ]
     pairs = [pair for pair in pairs if not _overlaps(bodies, pair, t)]
     restitution = 0.0 if settings is None else settings.restitution
     standoff = 0.0 if case.fluid is None else STANDOFF * float(case.fluid.grid.smallest.min())
     return RigidContact(bodies, pairs, restitution=restitution, standoff=standoff) if pairs else None
+
+
+@dataclass(frozen=True)
+class _Friction:
+    """Coefficients of friction of what touches, by names."""
+
+    default: float
+    own: Mapping[frozenset[str], float]  #: of pairs with a section of their own
+
+    @classmethod
+    def of(cls, settings: ContactSection | None) -> _Friction:
+        if settings is None:
+            return cls(0.0, {})
+        default = settings.friction or Friction()
+        own = {
+            frozenset(pair.bodies): (pair.friction or Friction()).coefficient or 0.0
+            for pair in settings.rigid_pairs.values()
+        }
+        return cls(default.coefficient or 0.0, own)
+
+    def __call__(self, one: str, other: str) -> float:
+        return self.own.get(frozenset((one, other)), self.default)
 
 
 def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[Obstacle]:

@@ -15,6 +15,7 @@ from fsci.case.free_checks import free_mistakes
 from fsci.case.material import HolzapfelGasserOgdenSection, OwnLawSection, has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
+from fsci.case.rigid_pair_checks import rigid_pair_mistakes
 from fsci.case.shapes import ShapeSection
 from fsci.case.structure import NO_MIXED_SIMPLICES, BodySection, StructureSection
 from fsci.case.yaml_text import Keys
@@ -37,7 +38,7 @@ def mistakes(case: Case) -> Iterator[Mistake]:
 
 
 #: Settings of 'contact' for free rigid bodies.
-OF_FREE_BODIES = ("friction", "restitution", "obstacles", "bodies")
+OF_FREE_BODIES = ("friction", "restitution", "obstacles", "bodies", "rigid_pairs")
 
 
 def _sections(case: Case) -> Iterator[Mistake]:
@@ -183,6 +184,7 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
         yield missing, "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"
     if "restitution" in contact.model_fields_set and case.rigid is None:
         yield ("contact", "restitution"), "'restitution' is for free rigid bodies, which this case has not"
+    yield from rigid_pair_mistakes(case, contact)
     film = contact.film
     if (film.value or film.seal or film.closed != "dry") and case.fluid is None:
         yield ("contact", "film"), "'film' describes the fluid between surfaces and needs the section 'fluid'"

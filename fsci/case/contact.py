@@ -11,6 +11,7 @@ from fsci.case.free_body import FreeMotion
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
+    EntryCount,
     Name,
     NotNegative,
     OrNone,
@@ -136,7 +137,11 @@ class PairSection(Section):
             raise fault("a surface cannot be tied to itself", "tied")
         where, slave = self.sides[0]
         if slave.obstacle is not None:
-            raise fault("the slave must be a surface of a body: make the obstacle the master", where)
+            raise fault(
+                "the slave must be a surface of a body: make the obstacle the master; friction of two rigid bodies is"
+                " in 'rigid_pairs'",
+                where,
+            )
         if self.tied and self.friction is not None and self.friction.some:
             raise fault("tied surfaces do not slide: remove 'friction' or 'tied'", "friction")
         if self.tied and self.interference is not None:
@@ -169,6 +174,18 @@ class ObstacleSection(Section):
         if self.motion is not None and self.free is not None:
             raise fault("give either 'motion' or 'free', not both", "free")
         return self
+
+
+class RigidPairSection(Section):
+    """Two that may touch, of which one at least is a free rigid body: how they do it."""
+
+    bodies: Annotated[tuple[Name, ...], EntryCount(2, 2)] = setting(
+        ...,
+        "two names: free rigid bodies, or one of these and a body of given motion, an obstacle, or a closed patch",
+    )
+    friction: Annotated[Friction | None, OrNone(Friction())] = setting(
+        None, "friction law by its coefficient, or none; default: none"
+    )
 
 
 class FilmSection(Section):
@@ -246,6 +263,9 @@ class ContactSection(Section):
         None,
         "largest distance of two surfaces at the start that 'bodies' makes a pair; default: any",
         unit="m",
+    )
+    rigid_pairs: dict[Name, RigidPairSection] = setting(
+        dict, "friction of two free rigid bodies, or of one and what it touches, other than that of 'contact'"
     )
     obstacles: dict[Name, ObstacleSection] = setting(dict, "rigid surfaces by name")
     film: FilmSection = setting(

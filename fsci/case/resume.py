@@ -39,7 +39,7 @@ CHANGEABLE = (
         for name in ("density", "gravity", "springs", "loads", "held", "leaves")
     ),
     *(f"rigid.{name}" for name in ("gravity", "dynamics")),
-    *(f"contact.{name}" for name in ("friction", "restitution", "obstacles.*.motion", "c_n")),
+    *(f"contact.{name}" for name in ("friction", "restitution", "obstacles.*.motion", "rigid_pairs", "c_n")),
     *(f"contact.pairs.*.{name}" for name in ("friction", "interference")),
     *(f"coupling.{name}" for name in ("relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")),
     "probes",

@@ -23,7 +23,7 @@ from solvers.algebra.rows import RowTransformation
 from solvers.algebra.sparse import Sparse, nothing, sparse_from_entries
 from solvers.api import Array
 from solvers.rigid.body import RigidBody
-from solvers.rigid.coulomb import Touch, contact_forces
+from solvers.rigid.coulomb import Touch, contact_forces, positive_definite
 from solvers.rigid.impact import AT_BOUND, Closed
 from solvers.rigid.near import Moment, Near, Obstacle, RigidPair, search, vertices
 from solvers.rigid.turning import turning
@@ -59,6 +59,7 @@ class RigidContact:
         self.touch = Touch(np.empty((0, 2, bodies[0].dim, 1)), self.near.body, self.near.friction)
         self.z = np.zeros_like(self.near.x)  #: forces [N] in the frames, the pressing one first
         self.stiffness = nothing((self._unknowns, self._unknowns))  #: minus the derivative of `force`, forces turning
+        self.tangent = self.stiffness  #: of the bodies, that the forces of the last `press` belong to
         self._start: Array | None = None  # forces in the frames at the last press of this step
         self._measured = 0  # in this step
         self._pressing = np.empty(0, dtype=np.int64), self.near.x  # vertices and forces [N] in space at the last press
@@ -122,26 +123,30 @@ class RigidContact:
     def press(self, tangent: Sparse, right: Array) -> None:
         """Set the contact forces for a Newton iteration; right: minus the balance without contact.
 
-        When the balance with these forces vanishes, gaps and forces fulfil the conditions of contact.
+        When the balance with these forces vanishes, gaps and forces fulfil the conditions of contact. Where
+        forces that turn are larger than what the inertia of the bodies holds upright, they do not turn in `tangent`.
         """
+        self.tangent = tangent
         if len(self.z) == 0:
             return
-        self.z = contact_forces(tangent, right, self.touch, self._ways(), self._start)[1]
+        if not positive_definite(tangent):
+            self.tangent = tangent + -1.0 * self.stiffness
+        self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
         active = self.active
         in_space = np.einsum("mde,md->me", self.near.frame[active], self.z[active])
         self._pressing = self.near.vertex[active], in_space
 
-    def transformation(self, tangent: Sparse) -> RowTransformation | None:
+    def transformation(self) -> RowTransformation | None:
         """Transformation that eliminates the forces from J du = b + F z with C du = -c; None without contact.
 
         C has the normals, and the tangents of contacts that stick; F has the forces, with friction of those that slide.
-        With S = C K^-1 F: rows L = 1 - F S^-1 C K^-1, added A = F S^-1 C, right -F S^-1 c.
+        With S = C K^-1 F: rows L = 1 - F S^-1 C K^-1, added A = F S^-1 C, right -F S^-1 c. Any regular K will do.
         """
         active = self.active
         if not active.any():
             return None
         touch, z = self.touch[active], self.z[active]
-        unknowns, dim = len(tangent.indptr) - 1, z.shape[1]
+        unknowns, dim = self._unknowns, z.shape[1]
         stuck = np.linalg.norm(z[:, 1:], axis=1) < AT_BOUND * touch.friction * z[:, 0]
         slide = np.where(stuck[:, None], 0.0, z[:, 1:] / z[:, :1])
         kept = np.flatnonzero(np.concatenate([np.ones((len(z), 1), bool), np.tile(stuck[:, None], dim - 1)], 1).ravel())
@@ -152,7 +157,7 @@ class RigidContact:
         C, F = C[:, dofs], F[dofs]
         number = np.full(unknowns, -1)
         number[dofs] = np.arange(len(dofs))
-        K = tangent[dofs].columns(dofs).toarray()
+        K = self.tangent[dofs].columns(dofs).toarray()
         through = np.linalg.solve(K.T, C.T).T
         back = F @ np.linalg.pinv(through @ F, rcond=REDUNDANT)
         n = len(dofs)

@@ -167,6 +167,20 @@ def solver(K: Sparse) -> Callable[[Array], Array]:
     return splu(csc_matrix((turned.data, turned.indices, turned.indptr), shape=K.shape)).solve
 
 
+def positive_definite(K: Sparse) -> bool:
+    """Whether the symmetric part of K is, by the signs of its pivots; then one motion belongs to the forces f."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    half = csc_matrix((K.data, K.indices, K.indptr), shape=K.shape)
+    lower = {"SymmetricMode": True}
+    try:
+        factors = splu(half + half.T, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=lower)
+    except RuntimeError:  # singular
+        return False
+    return bool((factors.perm_r == factors.perm_c).all() and (factors.U.diagonal() > 0.0).all())
+
+
 def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | None = None) -> tuple[Array, Array]:
     """(u, z) of shapes (n,) and (m, dim). start: z of a problem nearby.
 
@@ -191,7 +205,7 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
         w = w0 + touch.motion(u)
         z = project(before - share * r[:, None] * w, touch.friction)[0]
         change = (z - before) / share
-        if _found(z, change, last):
+        if _found(z, change, last, share):
             return u, z
         slow = float(np.abs(change).max()) > SLOW_CHANGE * float(np.abs(last).max())
         share = min(LARGEST_SHARE if slow else max(1.0, share), SHARE_GROWTH * share)
@@ -200,12 +214,14 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
     raise StepFailed("rigid bodies", FailureKind.JAMMED, NO_FORCES)
 
 
-def _found(z: Array, change: Array, last: Array) -> bool:
+def _found(z: Array, change: Array, last: Array, share: float) -> bool:
     """Whether proximal steps have found z; change, last: its change in the last one and in that before.
 
     Vertices of one body that stick need not agree on its motion: in a step a second one lands beside the first one, and
     its way before belongs to the step. Their friction then grows by the same in each step, at the same motion, without
-    any change of the normal forces: it need not be followed to the end, where one of them slides.
+    any change of the normal forces. With the largest share of r one of them mostly slides soon; where it does not, the
+    growth need not be followed to the end. With a smaller one, what it leaves in the balance is too much for bodies on
+    which small forces act beside large ones.
     """
     scale, missed = float(np.abs(z).max()), float(np.abs(change).max())
     if missed <= FOUND * scale:
@@ -214,7 +230,7 @@ def _found(z: Array, change: Array, last: Array) -> bool:
         return False
     if missed <= FORCE_ROUNDING * scale and missed >= 0.5 * float(np.abs(last).max()):
         return True
-    steady = float(np.abs(change - last).max()) <= STEADY_CHANGE * missed
+    steady = share == LARGEST_SHARE and float(np.abs(change - last).max()) <= STEADY_CHANGE * missed
     return steady and float(np.abs(change[:, 0]).max()) <= NEGLIGIBLE_CHANGE * scale
 
 

@@ -360,7 +360,7 @@ class RigidBodies:
             if self.contact is None and not self.springs:
                 blocks = self._without_held(self._blocks())
                 return self._add(np.linalg.solve(blocks, right.reshape(*blocks.shape[:2], 1)).ravel())
-            return self._add(solver(self._system())(right))
+            return self._add(solver(self._system() if self.contact is None else self.contact.tangent)(right))
 
     def _system(self) -> Sparse:
         """The tangent with rows and columns of the identity for held components."""
@@ -444,7 +444,7 @@ class RigidBodies:
 
     def row_transformations(self) -> list[RowTransformation]:
         with supported():
-            change = None if self.contact is None else self.contact.transformation(self._system())
+            change = None if self.contact is None else self.contact.transformation()
         return [] if change is None else [replace(change, dofs=self.first + change.dofs)]
 
     def recover(self, taken: Sequence[TakenRows], du: Array) -> None:

@@ -47,7 +47,8 @@ MISTAKES = [
     (
         "{body: block, on: top}",
         "{obstacle: plate}",
-        "16:20: the slave must be a surface of a body: make the obstacle the master",
+        "16:20: the slave must be a surface of a body: make the obstacle the master; friction of two rigid bodies is"
+        " in 'rigid_pairs'",
         "{obstacle",
     ),
     (
@@ -94,7 +95,8 @@ MISTAKES = [
     (
         "contact:\n",
         "contact:\n  gap: 1\n",
-        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, restitution, reach, obstacles, film, c_n)",
+        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, restitution, reach, rigid_pairs, obstacles,"
+        " film, c_n)",
         "gap",
     ),
     (
