@@ -85,7 +85,12 @@ NAMES = [folder.name for folder in CASES]
 SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)])
+#: in space, with forms that no other quick test has; their whole runs are slow tests
+DEAR = ("falling_sphere", "rebound_stokes", "sphere_tube", "torus_rough")
+OTHERS = [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)]
+
+
+@pytest.mark.parametrize("name", with_slow(OTHERS, lambda name: name in DEAR, {}))
 def test_first_steps(name, tmp_path):
     three_steps(name, tmp_path)
 
