@@ -31,7 +31,6 @@ SMALLER = {
         "fluid.grid.y=[{to: 0.1288, cells: 6, ratio: 0.5}, {to: 0.2712, cells: 10}, {to: 0.41, cells: 6, ratio: 2}]",
     ],
     "rebound_stokes": [
-        "fluid.element=q1q1",
         *(f"fluid.grid.{axis}=[{{to: 0.6, cells: 2}}, {{to: 2, cells: 1}}]" for axis in "xy"),
         "fluid.grid.z=[{to: 1.2, cells: 4}, {to: 2.5, cells: 1}]",
         "structure.bodies.ball.mesh.parameters={fine: 0.1}",
