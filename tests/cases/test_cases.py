@@ -31,7 +31,6 @@ SMALLER = {
         "fluid.grid.y=[{to: 0.1288, cells: 6, ratio: 0.5}, {to: 0.2712, cells: 10}, {to: 0.41, cells: 6, ratio: 2}]",
     ],
     "rebound_stokes": [
-        "fluid.element=q1q1",
         *(f"fluid.grid.{axis}=[{{to: 0.6, cells: 2}}, {{to: 2, cells: 1}}]" for axis in "xy"),
         "fluid.grid.z=[{to: 1.2, cells: 4}, {to: 2.5, cells: 1}]",
         "structure.bodies.ball.mesh.parameters={fine: 0.1}",
@@ -85,7 +84,12 @@ NAMES = [folder.name for folder in CASES]
 SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)])
+#: in space, with forms that no other quick test has; their whole runs are slow tests
+DEAR = ("falling_sphere", "rebound_stokes", "sphere_tube", "torus_rough")
+OTHERS = [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)]
+
+
+@pytest.mark.parametrize("name", with_slow(OTHERS, lambda name: name in DEAR, {}))
 def test_first_steps(name, tmp_path):
     three_steps(name, tmp_path)
 

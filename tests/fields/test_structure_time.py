@@ -45,7 +45,9 @@ def swing(rho_inf, dt):
     return structure.now.u.copy()
 
 
-@pytest.mark.parametrize(("rho_inf", "dt"), [(1.0, 0.0025), (0.8, 0.0025), (0.0, 0.00125)])
+@pytest.mark.parametrize(
+    ("rho_inf", "dt"), [(1.0, 0.0025), (0.8, 0.0025), pytest.param(0.0, 0.00125, marks=pytest.mark.slow)]
+)
 def test_second_order(rho_inf, dt):
     coarse, middle, fine = (swing(rho_inf, dt / 2**k) for k in range(3))
     ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
