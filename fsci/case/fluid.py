@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -28,9 +28,11 @@ from fsci.case.values import (
     Vector,
     chosen,
 )
-from solvers.fluid.settings.shear_law import ShearLaw
 from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
-from solvers.fluid.terms.boundary.windkessel import Windkessel
+
+if TYPE_CHECKING:
+    from solvers.fluid.settings.shear_law import ShearLaw
+    from solvers.fluid.terms.boundary.windkessel import Windkessel
 
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 KINDS_OF_PATCH = tuple(PATCH_KINDS)
@@ -120,6 +122,8 @@ class PatchSection(Section):
     @property
     def outlet(self) -> Windkessel | None:
         """The law of its pressure; None: there is none."""
+        from solvers.fluid.terms.boundary.windkessel import Windkessel
+
         if self.resistance is not None:
             return Windkessel(self.resistance)
         if (w := self.windkessel) is None:
@@ -209,6 +213,8 @@ class CarreauSection(Section):
 
     def of(self, viscosity: float) -> tuple[float, ShearLaw]:
         """(viscosity at rest [Pa s], law) with the given `viscosity`."""
+        from solvers.fluid.settings.shear_law import ShearLaw
+
         return viscosity, ShearLaw(self.infinite, self.time, self.exponent)
 
 
@@ -221,6 +227,8 @@ class PowerLawSection(Section):
 
     def of(self, viscosity: float) -> tuple[float, ShearLaw]:
         """(viscosity at rest [Pa s], law) with the given `viscosity`, that at the rate 1/s."""
+        from solvers.fluid.settings.shear_law import ShearLaw
+
         return viscosity * self.least_rate ** (self.exponent - 1.0), ShearLaw(0.0, 1.0 / self.least_rate, self.exponent)
 
 

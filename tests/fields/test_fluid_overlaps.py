@@ -15,6 +15,7 @@ from solvers.fluid.grid.box import uniform
 from solvers.fluid.surfaces.surface import Motion
 from solvers.fluid.terms.boundary.patches import Patch
 from solvers.mesh.gauss import gauss
+from solvers.mesh.tessellation import unit_normals
 
 WEIGHT = 3.0
 
@@ -116,7 +117,8 @@ def test_slit_between_two_bodies(gap, turns):
     facets, points = np.concatenate([loop(7), loop(7) + 7]), gauss(3)[0]
     grid = uniform([0, 0], [1, 1], [1, 1])
     moments = kernels.moments(grid.edges, points, x + 0.5, facets, np.ones(1, dtype=bool))
-    found = Unions(grid, points)(moments, facets, x + 0.5, None)
+    normal = -unit_normals(x[facets])
+    found, _ = Unions(grid, points)(moments, facets, x + 0.5, normal, None)
     assert max(0.0, 1.0 - found.fraction[0]) == pytest.approx(max(gap, 0.0), abs=1e-14)
     if gap > 0.0:
         assert found.piece_mass.sum() == pytest.approx(moments.piece_mass.sum(), abs=1e-12)

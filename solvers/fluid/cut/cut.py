@@ -177,11 +177,11 @@ class Cutter:
         if self._closing is not None:
             still = self._closed & (moments.fraction > 1.0 - SLIT) if self._steady else self._shut
             moments = filled(moments, self.points, still)
+        piece_normal = normal[moments.piece_facet]
         if self.unions:
-            moments = self._unions(moments, facets, x, self._tied)
+            moments, piece_normal = self._unions(moments, facets, x, normal, self._tied)
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
-        piece_normal = normal[moments.piece_facet]
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
         touched = counts[moments.piece_facet] & (cells >= 0)
         is_cut, in_use = self._cut_cells(moments, cells, touched)
@@ -191,7 +191,7 @@ class Cutter:
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
         self._special |= is_cut | strip
-        touching = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
+        touching = solid & (self._facing(moments, counts, piece_normal) | self._covered(motion.x[facets[~off]]))
         if self._closing is not None:
             touching |= still
             self.closed = still.copy()
@@ -308,8 +308,7 @@ class Cutter:
         in_face = across >= 0
         number = np.concatenate([number, across[in_face]])
         area = np.concatenate([area, area[in_face]])
-        outward = normal[moments.piece_facet]
-        outward = np.concatenate([outward, outward[in_face]])
+        outward = np.concatenate([normal, normal[in_face]])
         total = np.bincount(number, area, size)
         net = np.stack([np.bincount(number, area * n, size) for n in outward.T])
         return (total > 0.0) & (np.linalg.norm(net, axis=0) < 0.5 * total)

@@ -6,13 +6,19 @@ import numpy as np
 
 from solvers.api import Array, Indices, Mask
 from solvers.cut_cells import CellState, CutTable
-from solvers.fluid.geometry.pieces import FLUSH, Pieces, joined_pieces, place_of
+from solvers.fluid.geometry.pieces import FLUSH, ROUNDING_OF_POSITION, Pieces, joined_pieces, place_of
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.lagrange import lagrange, lagrange_slopes
 from solvers.mesh.tessellation import unit_normals
 
 #: Gap, relative to the smallest cell, up to which surfaces touch: there is no fluid between them.
 TOUCHING = FLUSH
+
+#: Gap, in rounding errors of a position, up to which two surfaces in 3D may be the same: 2 sqrt(3), and some more.
+ROUNDINGS_APART = 8.0
+
+#: Distance from the box, in its largest extent, that is far; positions are rounded to 2^-61 of the largest.
+FAR_OUTSIDE = 2.0**12
 
 #: Area of a face, and difference of volumes, relative to a cell, that are rounding error.
 SAME_VOLUME = 1e-9
@@ -24,6 +30,21 @@ ROUNDING_OF_AREA = 1e-13
 def closing_length(grid: Grid) -> float:
     """Gap [m] up to which surfaces touch: there is no fluid between them."""
     return TOUCHING * min(float(np.diff(edge).min()) for edge in grid.edges)
+
+
+def length_of_rounding(grid: Grid) -> float:
+    """Gap [m] of surfaces that lie in each other but for rounding."""
+    return float(ROUNDINGS_APART * ROUNDING_OF_POSITION * max(np.abs(edge).max() for edge in grid.edges))
+
+
+def within_reach(grid: Grid, x: Array) -> Array:
+    """Vertices [m], those that are far from the box put closer, where they cut no cell either.
+
+    Bodies of an iterate that diverges may be anywhere, and positions are whole numbers in the table.
+    """
+    low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
+    reach = FAR_OUTSIDE * float((high - low).max())
+    return np.clip(x, low - reach, high + reach)
 
 
 def with_several_bodies(grid: Grid, moments, body: Indices) -> Mask:
@@ -98,7 +119,7 @@ def _ends(table: CutTable, points: Array, grid: Grid, normal: Array, some: Indic
     slopes = lagrange_slopes(points)  # of each polynomial at each point
     for axis in range(dim):
         by_axis = np.moveaxis(table.moments.reshape(regions, *shape), dim - axis, -1) @ slopes
-        found[:, :, axis] = np.moveaxis(by_axis, -1, dim - axis).reshape(regions, -1) * face[:, axis, None]
+        found[:, :, axis] = np.moveaxis(by_axis, -1, dim - axis).reshape(regions, n**dim) * face[:, axis, None]
         for side in (0, 1):
             at = np.flatnonzero((table.face_axis == axis) & (table.face_regions[:, 1 - side] >= 0))
             region = table.face_regions[at, 1 - side]
@@ -106,7 +127,7 @@ def _ends(table: CutTable, points: Array, grid: Grid, normal: Array, some: Indic
                 -1, *(1,) * (dim - 1)
             )
             outward = (2.0 * side - 1.0) * lagrange(points, np.array(float(side)))
-            spread = np.moveaxis(np.multiply.outer(on_face, outward), -1, dim - axis).reshape(len(at), -1)
+            spread = np.moveaxis(np.multiply.outer(on_face, outward), -1, dim - axis).reshape(len(at), n**dim)
             np.subtract.at(found[:, :, axis], region, spread)
     measure = table.piece_moments.sum(axis=2)
     np.subtract.at(found, table.piece_region, measure[:, :, None] * normal[table.piece_facet][:, None, :])

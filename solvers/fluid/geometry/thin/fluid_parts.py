@@ -18,6 +18,7 @@ from solvers.fluid.geometry.regions import (
     largest_faces,
     touching_cells,
     with_several_bodies,
+    within_reach,
 )
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import gauss
@@ -49,7 +50,9 @@ class Geometry:
 
     def cut(self, edges: Sequence[Array], count: int) -> CutTable:
         """The table of these grid lines."""
-        return cut_cells(edges, gauss(count)[0], self.surfaces, self.x, closing=closing_length(self.grid))
+        return cut_cells(
+            edges, gauss(count)[0], self.surfaces, within_reach(self.grid, self.x), closing=closing_length(self.grid)
+        )
 
 
 @dataclass(frozen=True)
