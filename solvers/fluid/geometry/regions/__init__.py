@@ -1,0 +1,1 @@
+"""Regions into which surfaces divide a cell, its faces and edges."""
