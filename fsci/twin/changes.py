@@ -10,6 +10,7 @@ from typing import Any, Literal
 from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import Case
 from fsci.case.contact import PairSection
+from fsci.case.material import OwnLawSection
 from fsci.case.mesh import FileMesh
 from fsci.meshes.of_case import read_body
 from fsci.twin.frames import MIRRORED, TURNED, Coordinates
@@ -162,6 +163,7 @@ def _orders_of_bodies(case: Case) -> Iterator[Twin]:
     members = {
         "structure.bodies": _section(case, "structure", "bodies"),
         "fluid.bodies": _section(case, "fluid", "bodies"),
+        "rigid.bodies": _section(case, "rigid", "bodies"),
         "contact.pairs": _pairs(case),
     }
     left_to_the_program = members["contact.pairs"].keys() - _section(case, "contact", "pairs").keys()
@@ -175,12 +177,17 @@ def _orders_of_bodies(case: Case) -> Iterator[Twin]:
 
 
 def _c_n(case: Case) -> Iterator[Twin]:
-    if case.contact is not None:
+    if case.contact is not None and case.structure is not None:
         yield Twin("c_n", "ten times c_n", "defect", (("contact.c_n", repr(10.0 * case.contact.c_n)),))
 
 
 def _frames(case: Case) -> Iterator[Twin]:
-    """Raises CaseError where only a mesh file says how many dimensions there are, and cannot be read."""
+    """Not with laws of the user, whose code may have directions of its own.
+
+    Raises CaseError where only a mesh file says how many dimensions there are, and cannot be read.
+    """
+    if any(isinstance(body.material, OwnLawSection) for body in case.elastic_bodies.values()):
+        return
     dimension = case.dimension or read_body(case, next(iter(case.elastic_bodies))).points.shape[1]
     for frame in (MIRRORED, TURNED):
         yield Twin(frame.name, frame.words, "defect", frame.settings(case, dimension), frame=frame)

@@ -236,6 +236,23 @@ def test_a_wall_that_slides(element):
     assert abs(lost) < 1e-4 * drag * speed
 
 
+def test_the_first_force_is_no_measure_of_others():
+    """A wall starts to slide in fluid at rest, whose viscosity is 1e4 times that of the flow: the tolerance holds."""
+    mu, law = power_law(0.5, 1e-8)
+    walls = Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip")
+    low = body("low", *block([-5, -3], [6, LOW]), velocity=np.array([2.0, 0.0]))
+    high = body("high", *block([-5, 1.0 + LOW], [6, 4]))
+    found = []
+    for tolerance in (1e-8, 1e-14):
+        fluid = make_fluid(
+            uniform([0, -0.2], [1, 1.2], [8, 14]), [walls], [low, high], mu=mu, shear=law, scheme="steady",
+            solver=SolverSettings(Tolerance(tolerance, max_iterations=60), linear="direct"),
+        )  # fmt: skip
+        step(fluid, 0.0, 1.0)
+        found.append(on_bodies(fluid))
+    assert found[0] == pytest.approx(found[1], rel=1e-5)
+
+
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 @pytest.mark.parametrize("law", [ShearLaw(0.001, 2.0, 1.0), ShearLaw(0.03, 2.0, 0.4)])
 def test_limits_are_newtonian_around_a_moving_body(element, law):

@@ -12,6 +12,7 @@ from fsci.builder.own_law import own_law_at_rest
 from fsci.case import CaseError, load_case
 from fsci.check.meshes import check_meshes
 from fsci.running.history import read_history
+from fsci.twin.changes import twins
 from solvers.structure.materials.own_energy import at_small_strains
 
 CODE = """
@@ -122,6 +123,14 @@ def test_twins_trust_what_their_case_trusts(tmp_path):
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert "trust" not in (tmp_path / "twins" / "twin.json").read_text()
     assert json.loads((tmp_path / "twins" / "processes" / "summary.json").read_text())["status"] == "finished"
+
+
+def test_twins_leave_the_axes_of_a_law_alone(tmp_path):
+    """Its code cannot be turned with the rest of the case."""
+    folder = folder_of(tmp_path, "{law: 'laws.py:Yeoh', parameters: {c10: 2, c20: 0.1, bulk: 50}}")
+    names = [one.name for one in twins(load_case(folder / "case.yaml", trust=True))]
+    assert "step" in names
+    assert not {"mirrored", "turned"} & set(names)
 
 
 def test_python_runs_trusted_code(tmp_path):

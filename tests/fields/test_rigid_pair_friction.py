@@ -9,6 +9,7 @@ import pytest
 from fsci.case import CaseError, load_case
 from fsci.running.history import read_history
 from fsci.running.run import FINISHED, run_case
+from fsci.twin.changes import twins
 
 #: Gravity of a slope in its own frame: a block on another one, which lies on a floor; a third beside them.
 BLOCKS = """\
@@ -62,6 +63,15 @@ def test_the_order_of_names_and_the_scale_do_not_matter(tmp_path):
     two = ways(tmp_path / "two", text)
     for name, way in one.items():
         assert two[name] == pytest.approx(1e-3 * way, rel=1e-6, abs=1e-13), name
+
+
+def test_twins_of_free_bodies(tmp_path):
+    """The opposite order of bodies is one; there is no c_n to change."""
+    case = load_case(written(tmp_path, BLOCKS))
+    found = {twin.name: twin for twin in twins(case)}
+    assert "c_n" not in found
+    other = load_case(tmp_path / "case.yaml", found["reversed"].settings)
+    assert list(other.rigid) == list(reversed(case.rigid))
 
 
 #: A block on the floor of a flow in next to no fluid, which slides, beside one that rests.

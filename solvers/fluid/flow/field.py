@@ -22,6 +22,7 @@ from solvers.api import Array, State, StepInfo
 from solvers.fluid.cut.cut import Cut
 from solvers.fluid.flow import reach
 from solvers.fluid.flow.balances import Balances
+from solvers.fluid.flow.change_of_forces import ChangeOfForces
 from solvers.fluid.flow.discretisation import Discretisation
 from solvers.fluid.flow.flow_iterate import FlowIterate
 from solvers.fluid.flow.history import History
@@ -84,7 +85,7 @@ class Fluid:
         self.started = False  #: a step was accepted, hence forces exist
         self._iterations_of_step = 0  #: of all linear systems of this step
         self.steady_iteration = SteadyIteration()
-        self._first = 0.0  #: residual of the first iterate [N]
+        self._change = ChangeOfForces(settings)
 
     # ------------------------------------------------------------------------------------------------- the parts
 
@@ -203,7 +204,7 @@ class Fluid:
 
     def _begin_system(self, step: FlowStep) -> None:
         """Set loads and history terms of the step."""
-        self._first = 0.0
+        self._change.begin()
         self.on_cells.begin_system(step, self.moving.slip.rate(step.difference))
 
     def predict(self, *, with_pressure: bool = False) -> None:
@@ -216,7 +217,7 @@ class Fluid:
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
         self.steady_iteration.begin()
-        self._first = 0.0
+        self._change.begin()
         info = converge(self, self.solver.newton)
         self.iterate.keep_levels()
         if not self.moving.coupled:
@@ -357,16 +358,13 @@ class Fluid:
     def residual(self) -> Array:
         """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell, shape (1,)."""
         size = self._norm(self.iterate.residual())
-        self.steady_iteration.record(size)
-        self._first = self._first or size
+        self._change.record(size, self.iterate, self._norm)
+        self.steady_iteration.record(size, self._change.size)
         return np.array([size])
 
     def forces(self) -> Array:
-        """Norm [N] of the first residual of the solution, of those that are not zero: the change of forces, shape (1,).
-
-        Those of later iterates, which may blow up, say nothing of the forces.
-        """
-        return np.array([self._first])
+        """Norm [N] of the change of forces, shape (1,)."""
+        return np.array([self._change.size])
 
     def _norm(self, rows: Array) -> float:
         return self.iterate.norm(rows, self.smallest_cell, self.difference.alpha)

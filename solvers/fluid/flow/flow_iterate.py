@@ -62,6 +62,20 @@ class FlowIterate:
         self.rows[self.held] = 0.0
         return self.rows
 
+    def residual_of(self, flow: Array) -> Array:
+        """The rows of another flow, at local dofs, with the viscosity that cut cells have now."""
+        present, rows = self._system.flow.x.array.copy(), self.rows
+        self._system.flow.x.array[:] = flow
+        with self._system.viscosity.kept():
+            found = self.residual()
+        self._system.flow.x.array[:], self.rows = present, rows
+        return found
+
+    def local_values(self) -> Array:
+        """A copy of `values` with those of other processes."""
+        found: Array = self._system.flow.x.array.copy()
+        return found
+
     def keep_rows(self, kept: NDArray[np.int32]) -> None:
         """Set all other rows to zero."""
         rows, self.rows = self.rows, np.zeros(self._size)
@@ -72,8 +86,9 @@ class FlowIterate:
 
         h: length of its edge [m]; alpha [1/s]: du_t/du.
         """
-        settings = self._system.settings
-        impedance = settings.viscosity / h + settings.density * (self._system.fastest + h * alpha)
+        system = self._system
+        mu = system.viscosity.where_it_shears(system.flow.x.array)
+        impedance = mu / h + system.settings.density * (system.fastest + h * alpha)
         scaled = np.where(self._unknowns.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self._unknowns.grid.comm.allreduce(float(scaled @ scaled)))
 

@@ -17,14 +17,16 @@ class SteadyIteration:
 
     def __init__(self) -> None:
         self._now = self._largest = 0.0
+        self._later: float | None = None  #: the largest after the first one, None before it
 
     def begin(self) -> None:
         """No residual of this step is known."""
-        self._largest = 0.0
+        self._largest, self._later = 0.0, None
 
-    def record(self, size: float) -> None:
-        """Note the norm of the present residual."""
-        self._now, self._largest = size, max(self._largest, size)
+    def record(self, size: float, change: float) -> None:
+        """Note the norm of the present residual; change: of the forces in the step, which stands for the first one."""
+        self._later = 0.0 if self._later is None else max(self._later, size)
+        self._now, self._largest = size, max(change, self._later)
 
     @property
     def scales_follow(self) -> bool:
