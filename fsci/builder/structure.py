@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import nan
 from typing import TYPE_CHECKING
 
@@ -87,6 +87,7 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
         try:
             meshes = {name: read_body(case, name) for name in case.elastic_bodies}
             locations = {name: find_locations(case, name, mesh) for name, mesh in meshes.items()}
+            _require_own_laws(case, meshes)
             if case.contact is not None:
                 from fsci.builder.adjust import adjusted
                 from fsci.builder.tied import join_tied
@@ -98,6 +99,16 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
     if error is not None:
         raise error
     return meshes, locations
+
+
+def _require_own_laws(case: Case, meshes: Mapping[str, Mesh]) -> None:
+    """Raises CaseError for a law of the user that is no energy, or unstable at rest."""
+    own = [name for name, body in case.elastic_bodies.items() if isinstance(body.material, OwnLawSection)]
+    if own:
+        from fsci.builder.own_law import own_law_at_rest
+
+        for name in own:
+            own_law_at_rest(case, name, meshes[name].points[meshes[name].cells].mean(axis=1).T)
 
 
 def _material(case: Case, name: str) -> Material:

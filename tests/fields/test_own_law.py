@@ -174,6 +174,12 @@ def test_mistakes_have_messages(tmp_path, name):
     assert str(problem).startswith(f"{folder}/case.yaml:{message}\n")
 
 
+def test_a_run_refuses_what_is_no_energy(tmp_path):
+    ended = fsci("run", folder_of(tmp_path, "{law: 'laws.py:Tensor'}"), "--trust", "-o", tmp_path / "out")
+    assert ended.returncode == 2
+    assert "8:23: the energy of 'Tensor' fails: TypeError: has the shape (3, 3), not that of a number" in ended.stderr
+
+
 @pytest.mark.parametrize(
     ("code", "message"),
     [

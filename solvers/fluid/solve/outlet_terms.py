@@ -34,8 +34,8 @@ class OutletTerms:
 
     def rates(self, flow: Array) -> Array:
         """q [m^3/s] of each outlet for values at owned dofs."""
-        own = self._fluxes @ flow
-        return own if self._comm.size == 1 else self._comm.allreduce(own)
+        own: Array = self._fluxes @ flow
+        return own if self._comm.size == 1 or not self.lines else self._comm.allreduce(own)
 
     def pressures(self, flow: Array) -> Array:
         """P [Pa] of each outlet."""
@@ -57,6 +57,8 @@ class OutletTerms:
 
     def rounding(self, flow: Array) -> Array:
         """Rounding errors of `rows`, as in `algebra.rounding`: those of each term of q, with random signs."""
+        if not self.lines:
+            return np.zeros(self._unknowns.owned)
         squares = self._fluxes**2 @ flow**2
         sizes = np.array([line.resistance for line in self.lines]) * np.sqrt(self._comm.allreduce(squares))
         return EPS * sizes @ np.abs(self._fluxes)
