@@ -62,8 +62,9 @@ def runs_in_copies(monkeypatch):
     """Runs that `fsci twin`, `converge`, `sweep` and `stress` start on one process need no new process."""
     from types import SimpleNamespace
 
-    from programs import Copies, run_command
+    from programs import WARM, run_command
 
+    WARM.start()
     monkeypatch.setattr("fsci.stress.program.subprocess", SimpleNamespace(**{**vars(subprocess), "run": run_command}))
     for module in ("fsci.twin.twin", "fsci.converge.converge", "fsci.sweep.sweep"):
-        monkeypatch.setattr(f"{module}.WarmProcess", Copies)
+        monkeypatch.setattr(f"{module}.WarmProcess", lambda: WARM)

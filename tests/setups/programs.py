@@ -13,6 +13,7 @@ from standing import COUNT, StandingProcesses
 
 from fsci.running.copied_process import exit_code, import_common, run_in_copy
 from fsci.running.copied_process import fsci as fsci_here
+from fsci.running.warm import WarmProcess
 
 ENVIRONMENT = {
     **os.environ,
@@ -91,17 +92,20 @@ def python_here(words) -> int:
     return exit_code(lambda: runpy.run_path(words[0], run_name="__main__"))
 
 
-class Copies:
-    """As WarmProcess, but runs are copies of this process."""
+class StandingWarmProcess(WarmProcess):
+    """A WarmProcess that serves all tests: a copy of this process could not copy itself while its threads run."""
 
-    def __enter__(self):
-        return self
+    def start(self) -> None:
+        """Start what copies of this process will share; again if it has ended."""
+        if self._process is not None and self._process.poll() is not None:
+            self._control = None
+        self._started()
 
     def __exit__(self, *error) -> None:
-        pass
+        """It stays, and ends with this process."""
 
-    def run(self, *words) -> subprocess.CompletedProcess[str]:
-        return run_in_copy(fsci_here, words, {})
+
+WARM = StandingWarmProcess()
 
 
 def on_processes(processes: int, *program, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
