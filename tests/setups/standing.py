@@ -21,6 +21,8 @@ from pathlib import Path
 
 COUNT = 2
 SECONDS_TO_START = 120.0
+#: Packages whose functions a program must leave as they were.
+SHARED = ("coupling", "dolfinx", "fsci", "mpi4py", "petsc4py", "solvers")
 #: Time [s] that the others have to end once one has failed, as mpirun ends them.
 SECONDS_TO_END = 10.0
 
@@ -113,8 +115,12 @@ def serve(address: str) -> None:
             return
         os.chdir(folder)
         _print_to(out, errors)
+        before = _functions()
         try:
             code = _run(program, words)
+            for name in _restored(before):
+                print(f"the program has left {name} changed", file=sys.stderr)
+                code = code or 1
         except BaseException:
             traceback.print_exc()
             sys.stderr.flush()
@@ -131,6 +137,22 @@ def _run(program: str, words: Sequence[str]) -> int:
     from programs import fsci_here, python_here
 
     return fsci_here(words) if program == "fsci" else python_here([program, *words])
+
+
+def _functions() -> dict[tuple[str, str], object]:
+    """Functions and classes of the modules that programs share, by module and name."""
+    modules = [(name, module) for name, module in sys.modules.items() if name.partition(".")[0] in SHARED]
+    return {(name, key): at for name, module in modules for key, at in vars(module).items() if callable(at)}
+
+
+def _restored(before: Mapping[tuple[str, str], object]) -> list[str]:
+    """Put functions back that are others than before; their names."""
+    found = []
+    for (name, key), at in before.items():
+        if getattr(sys.modules[name], key, None) is not at:
+            setattr(sys.modules[name], key, at)
+            found.append(f"{name}.{key}")
+    return found
 
 
 def _print_to(*paths: str) -> None:

@@ -16,6 +16,12 @@ if word == "both fail":
     sys.exit(2 + comm.rank)
 if word == "raises" and comm.rank == 1:
     raise RuntimeError("on purpose")
+if word == "patches":
+    import dolfinx.mesh
+    dolfinx.mesh.create_mesh = print
+if word == "asks":
+    import dolfinx.mesh
+    sys.exit(5 * (dolfinx.mesh.create_mesh is print))
 if word == "sleeps" or (word == "one leaves" and comm.rank == 0):
     time.sleep(600)
 if word == "one leaves":
@@ -60,3 +66,10 @@ def test_the_end_of_the_time_of_both(run):
     with pytest.raises(TimeoutExpired):
         run("sleeps", timeout=0.5)
     assert run("works").returncode == 0
+
+
+def test_a_function_that_a_program_replaces_is_put_back(run):
+    patched = run("patches")
+    assert patched.returncode == 1
+    assert patched.stderr.splitlines() == ["the program has left dolfinx.mesh.create_mesh changed"] * 2
+    assert run("asks").returncode == 0
