@@ -6,8 +6,10 @@ To start mpirun for each costs 2 seconds of work. What depends on the start or t
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import gc
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -25,6 +27,8 @@ SECONDS_TO_START = 120.0
 SHARED = ("coupling", "dolfinx", "fsci", "mpi4py", "petsc4py", "solvers")
 #: Time [s] that the others have to end once one has failed, as mpirun ends them.
 SECONDS_TO_END = 10.0
+#: Time [s] in which those whose time is over write where they are.
+SECONDS_TO_SAY = 2.0
 
 
 class StandingProcesses:
@@ -38,16 +42,19 @@ class StandingProcesses:
     def run(self, program: str, words: Sequence[str], timeout: float) -> subprocess.CompletedProcess[str]:
         """`program`: "fsci" or a file in Python. As subprocess.run of mpirun; raises TimeoutExpired like it."""
         if self._mpirun is None or self._mpirun.poll() is not None:
-            self._start()
+            self._mpirun = self._start()
         with tempfile.TemporaryDirectory() as folder:
             out, errors = (Path(folder, name) for name in ("out", "errors"))
             for connection in self._connections:
                 connection.send((program, list(words), os.getcwd(), str(out), str(errors)))
             try:
                 code = self._end(timeout)
-            except subprocess.TimeoutExpired:
+            except subprocess.TimeoutExpired as late:
+                self._mpirun.send_signal(signal.SIGUSR1)  # mpirun sends it to both, which write where they are
+                time.sleep(SECONDS_TO_SAY)
                 self.close(kill=True)
-                raise
+                places = [path.read_text() for path in sorted(Path(folder).glob("place*"))]
+                raise subprocess.TimeoutExpired("\n".join([program, *words, *places]), late.timeout) from None
             return subprocess.CompletedProcess([program, *words], code, out.read_text(), errors.read_text())
 
     def close(self, kill: bool = False) -> None:
@@ -61,7 +68,7 @@ class StandingProcesses:
             self._mpirun.wait(60.0)
             self._mpirun = None
 
-    def _start(self) -> None:
+    def _start(self) -> subprocess.Popen[bytes]:
         self.close()
         with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as server:
             address = str(Path(folder, "socket"))
@@ -70,8 +77,9 @@ class StandingProcesses:
             server.settimeout(SECONDS_TO_START)
             words = ["mpirun", "-n", str(COUNT), sys.executable, __file__, address]
             quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-            self._mpirun = subprocess.Popen(words, env=self._environment, **quiet)
+            started = subprocess.Popen(words, env=self._environment, **quiet)
             self._connections = [Connection(server.accept()[0].detach()) for _ in range(COUNT)]
+        return started
 
     def _end(self, timeout: float) -> int:
         """Wait for the codes of all processes; their first one that is not 0, or that of mpirun if it has ended."""
@@ -116,6 +124,8 @@ def serve(address: str) -> None:
         os.chdir(folder)
         _print_to(out, errors)
         before = _functions()
+        place = Path(errors).with_name(f"place{MPI.COMM_WORLD.rank}").open("w")
+        faulthandler.register(signal.SIGUSR1, place)
         try:
             code = _run(program, words)
             for name in _restored(before):
@@ -125,6 +135,8 @@ def serve(address: str) -> None:
             traceback.print_exc()
             sys.stderr.flush()
             MPI.COMM_WORLD.Abort(1)
+        faulthandler.unregister(signal.SIGUSR1)
+        place.close()
         gc.collect()  # here all processes let go of what they share
         for stream in (sys.stdout, sys.stderr):
             stream.flush()

@@ -63,7 +63,8 @@ def test_who_waits_for_one_that_has_failed_is_ended(run, monkeypatch):
 
 
 def test_the_end_of_the_time_of_both(run):
-    with pytest.raises(TimeoutExpired):
+    """It says where both were."""
+    with pytest.raises(TimeoutExpired, match=r"(?s)(program\.py\", line 18.*){2}"):
         run("sleeps", timeout=0.5)
     assert run("works").returncode == 0
 
