@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -312,16 +312,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.preview.preview import preview
 
-    try:
-        print("\n".join(preview(options.case, options.overrides, options.out)))
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, RuntimeError) as error:
-        return _fail(f"fsci preview: {error}")
-    return 0
+    return _printed("preview", lambda: preview(options.case, options.overrides, options.out))
 
 
 def _resume(options: argparse.Namespace) -> int:
@@ -345,47 +338,28 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.plot.picture import plot_run
 
     if not options.out.is_dir():
         return _fail(f"fsci plot: there is no folder '{options.out}'")
-    try:
-        files = plot_run(
+    return _printed(
+        "plot",
+        lambda: plot_run(
             options.out, movie=options.movie, field=options.field, times=options.times, mirrors=options.mirrors
-        )
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, ValueError, RuntimeError) as error:
-        return _fail(f"fsci plot: {error}")
-    print("\n".join(str(path) for path in files))
-    return 0
+        ),
+    )
 
 
 def _report(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.report.report import write_report
 
-    try:
-        print(write_report(options.out))
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, ValueError, RuntimeError) as error:
-        return _fail(f"fsci report: {error}")
-    return 0
+    return _printed("report", lambda: [write_report(options.out)])
 
 
 def _explain(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.explain.explain import explain
 
-    try:
-        print(explain(options.out, options.replay))
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, ValueError) as error:
-        return _fail(f"fsci explain: {error}")
-    return 0
+    return _printed("explain", lambda: [explain(options.out, options.replay)])
 
 
 def _twin(options: argparse.Namespace) -> int:
@@ -437,17 +411,23 @@ def _several(name: str, right: Callable[[], bool]) -> int:
 
 
 def _diff(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.diff import diff
 
     if len(options.outs) < 2:
         return _fail("fsci diff: give the folders of two or more runs")
+    return _printed("diff", lambda: diff(options.outs, options.pictures))
+
+
+def _printed(name: str, make: Callable[[], Iterable[object]]) -> int:
+    """A command that prints lines or the files that it has made."""
+    from fsci.case import CaseError
+
     try:
-        print("\n".join(diff(options.outs, options.pictures)))
+        print("\n".join(str(line) for line in make()))
     except CaseError as error:
         return _fail(str(error))
-    except (OSError, ValueError) as error:
-        return _fail(f"fsci diff: {error}")
+    except (OSError, ValueError, RuntimeError) as error:
+        return _fail(f"fsci {name}: {error}")
     return 0
 
 

@@ -13,7 +13,7 @@ WITH_DOLFINX = ("dolfinx", "basix", "ufl", "ffcx", "petsc4py", "mpi4py", "h5py")
 
 APT = (
     "sudo apt-get install --no-install-recommends build-essential python3-dev python3-dolfinx python3-petsc4py "
-    "python3-mpi4py python3-h5py python3-h5py-mpi"
+    "python3-mpi4py python3-h5py python3-h5py-mpi python3-scipy"
 )
 CONDA = 'conda install -c conda-forge fenics-dolfinx "petsc=*=real*" h5py cxx-compiler'
 PIP = f"{Path(sys.executable).name} -m pip install dolfinx-solver-real h5py"
