@@ -10,7 +10,13 @@ Field = Literal["structure", "fluid", "rigid"]
 FIELDS: tuple[Field, ...] = ("structure", "fluid", "rigid")
 
 #: Setting of a location -> its name in messages.
-LOCATIONS = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
+LOCATIONS = {
+    "pair": "'pair: PAIR'",
+    "at": "'at: [..]'",
+    "on": "'on: SURFACE'",
+    "through": "'through: PATCH'",
+    "plane": "'plane: {point: [..], normal: [..]}'",
+}
 WHOLE = ""  #: none of them: a body, or all fluid
 
 ENERGIES = ("kinetic", "internal", "work", "total")
@@ -87,7 +93,14 @@ _QUANTITIES = (
     Quantity("mass", (0, 1, 0), "one", (WHOLE,), needs=("density",), rigid=(WHOLE,)),
     Quantity("volume", (3, 0, 0), "one", (WHOLE,), (WHOLE,)),
     Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass", rigid=(WHOLE,)),
-    Quantity("flow_rate", (3, 0, -1), "one", (), ("through",), meaning="volume per time, out of the box"),
+    Quantity(
+        "flow_rate",
+        (3, 0, -1),
+        "one",
+        (),
+        ("through", "plane"),
+        meaning="volume per time, out of the box or along the normal",
+    ),
     Quantity("outlet_pressure", _STRESS, "one", (), ("through",), meaning="of a `resistance` or `windkessel`"),
     Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),
@@ -110,6 +123,7 @@ def _lines(field: Field) -> Iterator[str]:
         "on": f"with `on`, on a {'surface' if field == 'structure' else 'patch'}",
         "pair": "with `pair`, of a contact pair",
         "through": "with `through`, through a patch",
+        "plane": "with `plane`, through the part of a plane, in 2D of a line, that is in the fluid",
         WHOLE: "with none of them, of the whole",
     }
     for place, beginning in words.items():
