@@ -176,7 +176,8 @@ verify:
 BALL_README = """\
 # {name}
 
-An elastic ball of 1 m, 20 times as dense as the fluid, falls 1 m to the bottom of a box, touches it, and jumps up again.
+An elastic ball of 1 m, 20 times as dense as the fluid, falls 1 m to the bottom of a box,
+touches it, and jumps up again.
 
     fsci check {folder}                  # is the case right?
     fsci run {folder}                    # results in results/{name}

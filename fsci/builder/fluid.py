@@ -196,6 +196,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", ""): _extreme,
     ("force", ""): _force,
     ("moment", ""): _force,
+    ("power", ""): _force,
     ("drag_coefficient", ""): _coefficient,
     ("lift_coefficient", ""): _coefficient,
     ("volume", ""): _whole,

@@ -53,6 +53,7 @@ class Quantity:
 
 
 _LENGTH, _SPEED, _FORCE, _ENERGY, _STRESS = (1, 0, 0), (1, 0, -1), (1, 1, -2), (2, 1, -2), (-1, 1, -2)
+_POWER = (2, 1, -3)
 _QUANTITIES = (
     Quantity(
         "displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area", rigid=("at",)
@@ -104,10 +105,11 @@ _QUANTITIES = (
     Quantity("outlet_pressure", _STRESS, "one", (), ("through",), meaning="of a `resistance` or `windkessel`"),
     Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),
+    Quantity("power", _POWER, "one", (), (WHOLE,), ("body",), "of that force, with the velocity of its surface"),
     Quantity("drag_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
     Quantity("lift_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
     Quantity("kinetic_energy", _ENERGY, "one", (), (WHOLE,), meaning="of all fluid"),
-    Quantity("dissipation", (2, 1, -3), "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
+    Quantity("dissipation", _POWER, "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
 )
 QUANTITIES = {quantity.name: quantity for quantity in _QUANTITIES}
 

@@ -125,7 +125,7 @@ def test_wheel(tmp_path, wheel):
 def test_installed_program(tmp_path, wheel):
     """In a new virtual environment of the system's Python it writes, computes and draws its demonstration.
 
-    Python packages that it needs are those of the environment of the tests, whose fsci is not seen: pip would fetch them.
+    Python packages that it needs are those of the environment of the tests, whose fsci is not seen.
     """
     base = f"{sys.base_prefix}/bin/python3"
     subprocess.run([base, "-m", "venv", "--system-site-packages", tmp_path / "venv"], check=True)

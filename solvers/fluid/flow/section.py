@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -136,7 +136,9 @@ def _weights(fluid: Fluid, plane: Plane, cell: int, low: Array, high: Array, edg
     """Weights of the velocities of a cell in the flow rate, shape (functions, dim)."""
     polygon = _polygon(plane, low, high)
     size = float(np.linalg.norm(high - low))
-    near = edges[(edges[..., 0].max(axis=1) >= polygon[:, 0].min()) & (edges[..., 0].min(axis=1) <= polygon[:, 0].max())]
+    near = edges[
+        (edges[..., 0].max(axis=1) >= polygon[:, 0].min()) & (edges[..., 0].min(axis=1) <= polygon[:, 0].max())
+    ]
     degree, dim = fluid.unknowns.degree, fluid.grid.dim
     nodes, shares = gauss((degree * dim + dim) // 2)
     points, weights = [np.zeros((0, dim))], [np.zeros(0)]
@@ -181,7 +183,7 @@ def _lines(polygon: Array, edges: Array, size: float, points: int) -> list[tuple
     nodes, weights = gauss(points)
     return [
         (a + (b - a) * x, (b - a) * w)
-        for a, b in zip(breaks[:-1], breaks[1:], strict=True)
+        for a, b in pairwise(breaks)
         if b - a > ROUNDING * size
         for x, w in zip(nodes, weights, strict=True)
     ]
