@@ -46,6 +46,8 @@ probes:
   aside: {quantity: velocity, at: [1, 0.65]}
   covered: {quantity: pressure, at: [1.22, 0.58]}
   dp: {quantity: pressure, at: [0.1, 0.5], minus: [1.9, 0.5]}
+  across: {quantity: flow_rate, plane: {point: [1, 0.5], normal: [1, 0.3]}}
+  driven: {quantity: power, body: paddle}
   energy: {quantity: kinetic_energy}
   power: {quantity: dissipation}
   volume: {quantity: volume}

@@ -246,7 +246,10 @@ class Forces:
         self._step: Step | None = None  #: that these forces belong to
 
     def probe(self, quantity: str, body: str | None, about: Sequence[float] | None = None) -> Probe:
-        """Probe of the force [N] on a body (None: on all), its moment [N m] about a point (None: the origin), or power [W]."""
+        """Probe of the force [N] on a body, its moment [N m] about a point (None: the origin), or its power [W].
+
+        body: None for all.
+        """
         fluid = self.fluid
         names = [body] if body is not None else [b.surface.name for b in fluid.bodies]
         vertices = fluid.moving.surfaces.vertices_of(names)
