@@ -11,7 +11,7 @@ from fsci.case.fluid import FluidSection
 from fsci.case.grid import GridSection
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
-from fsci.case.probes import RESERVED_COLUMNS, Plane, Probe, Reference
+from fsci.case.probes import RESERVED_COLUMNS, PlaneSection, Probe, Reference
 from fsci.case.structure import StructureSection
 from fsci.case.verify import (
     BODY_COLUMN,
@@ -125,7 +125,7 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
             yield (*keys, key), f"the point ({place}) is outside of the fluid's box"
 
 
-def _plane(plane: Plane, grid: GridSection, keys: Keys) -> Iterator[Mistake]:
+def _plane(plane: PlaneSection, grid: GridSection, keys: Keys) -> Iterator[Mistake]:
     wrong = [
         *length_mistakes(plane.point, grid.dimension, (*keys, "point")),
         *length_mistakes(plane.normal, grid.dimension, (*keys, "normal")),

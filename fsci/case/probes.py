@@ -35,7 +35,7 @@ class Reference(Section):
     )  # fmt: skip
 
 
-class Plane(Section):
+class PlaneSection(Section):
     """A plane through the box of a flow, in 2D a line."""
 
     point: NumberVector = setting(..., "a point of it", unit="m")
@@ -75,7 +75,7 @@ column NAME. In 2D everything is per unit of depth.
         None, "another point of the fluid, whose value is subtracted from that of `at`", unit="m"
     )
     through: Text | None = setting(None, "name of a patch of the fluid")
-    plane: Plane | None = setting(None, "plane through the fluid")
+    plane: PlaneSection | None = setting(None, "plane through the fluid")
     pair: Name | None = setting(None, "name of a contact pair")
     extreme: Literal["largest", "least"] | None = setting(
         None, "of all slave nodes of the pair, or of all fluid; default: the least gap, the largest pressure"

@@ -20,11 +20,11 @@ from solvers.fluid.flow.field import Fluid
 from solvers.mesh.gauss import gauss
 
 #: Intervals shorter than this part of a cell are rounding.
-ROUNDING = 1e-13
+EMPTY_INTERVAL = 1e-13
 
 
 @dataclass(frozen=True)
-class Plane:
+class CrossingPlane:
     """A plane in 3D, a line in 2D, with coordinates in it."""
 
     point: Array  #: a point of it [m]
@@ -46,7 +46,7 @@ class Plane:
         return self.point + along if len(self.axes) == 1 else self.point + s * self.axes[0] + along
 
 
-def make_plane(point: Sequence[float], normal: Sequence[float]) -> Plane:
+def make_plane(point: Sequence[float], normal: Sequence[float]) -> CrossingPlane:
     """The plane through a point at right angles to a direction."""
     n = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
     if len(n) == 2:
@@ -55,7 +55,7 @@ def make_plane(point: Sequence[float], normal: Sequence[float]) -> Plane:
         s = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
         s /= np.linalg.norm(s)
         axes = np.stack([s, np.cross(n, s)])
-    return Plane(np.asarray(point, dtype=float), n, axes)
+    return CrossingPlane(np.asarray(point, dtype=float), n, axes)
 
 
 def flow_through(fluid: Fluid, point: Sequence[float], normal: Sequence[float]) -> Callable[[], dict[str, float]]:
@@ -95,7 +95,7 @@ def _bounds(fluid: Fluid) -> tuple[Array, Array]:
     return low, high
 
 
-def _cross(plane: Plane, low: Array, high: Array) -> Array:
+def _cross(plane: CrossingPlane, low: Array, high: Array) -> Array:
     """Mask of the cells that the plane crosses. A face in the plane belongs to the cell behind it."""
     corners = np.stack([plane.distance(_corner(low, high, side)) for side in product((0, 1), repeat=low.shape[1])])
     return (corners.min(axis=0) < 0.0) & (corners.max(axis=0) >= 0.0)
@@ -105,7 +105,7 @@ def _corner(low: Array, high: Array, side: Sequence[int]) -> Array:
     return np.where(np.asarray(side) == 1, high, low)
 
 
-def _edges(plane: Plane, facets: Array) -> Array:
+def _edges(plane: CrossingPlane, facets: Array) -> Array:
     """Ends (s, t) of the edges that the plane cuts out of facets, (n, 2, 2), the body on the same side of all.
 
     In 2D the plane is a line, t; a point of it stands for an edge from s = -1 to 1, or from 1 to -1.
@@ -132,7 +132,7 @@ def _edges(plane: Plane, facets: Array) -> Array:
     return np.stack([np.stack([-way, t], axis=1), np.stack([way, t], axis=1)], axis=1)
 
 
-def _weights(fluid: Fluid, plane: Plane, cell: int, low: Array, high: Array, edges: Array) -> Array:
+def _weights(fluid: Fluid, plane: CrossingPlane, cell: int, low: Array, high: Array, edges: Array) -> Array:
     """Weights of the velocities of a cell in the flow rate, shape (functions, dim)."""
     polygon = _polygon(plane, low, high)
     size = float(np.linalg.norm(high - low))
@@ -156,7 +156,7 @@ def _weights(fluid: Fluid, plane: Plane, cell: int, low: Array, high: Array, edg
     return np.outer(weight @ shapes, plane.normal)
 
 
-def _polygon(plane: Plane, low: Array, high: Array) -> Array:
+def _polygon(plane: CrossingPlane, low: Array, high: Array) -> Array:
     """Corners (s, t) of the part of the plane in a cell, in their order, shape (n, 2)."""
     sides = list(product((0, 1), repeat=len(low)))
     x = np.array([_corner(low, high, side) for side in sides])
@@ -184,7 +184,7 @@ def _lines(polygon: Array, edges: Array, size: float, points: int) -> list[tuple
     return [
         (a + (b - a) * x, (b - a) * w)
         for a, b in pairwise(breaks)
-        if b - a > ROUNDING * size
+        if b - a > EMPTY_INTERVAL * size
         for x, w in zip(nodes, weights, strict=True)
     ]
 
@@ -215,7 +215,7 @@ def _in_fluid(polygon: Array, edges: Array, s: float, size: float) -> list[tuple
     return [
         (a, b)
         for a, b, winding in zip(ends[:-1], ends[1:], windings, strict=True)
-        if winding == 0 and b - a > ROUNDING * size
+        if winding == 0 and b - a > EMPTY_INTERVAL * size
     ]
 
 
