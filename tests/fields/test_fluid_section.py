@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, solve_steady, wall
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from solvers.fluid.flow.section import flow_through
 from solvers.fluid.grid.box import Grid, uniform
@@ -145,3 +145,40 @@ def test_poiseuille_between_bodies(shift, scale, solved):
     for point, normal in (((1.5, 0.5), (1, 0)), ((1.37, 0.5), (2, 0)), ((1.4, 0.45), (1, 0.5)), ((1.4, 0.45), (-1, 1))):
         rate = flow_through(fluid, np.array(point) * scale, normal)()[""]
         assert abs(rate - np.sign(normal[0]) * exact) < 1e-10 * exact
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_both_sides_of_a_plate_in_one_cell_count_once(dim):
+    """A slanted plate of a hundredth of a cell, whose sides have unknowns of their own."""
+    points, facets = block([-0.003, -0.8, -0.8][:dim], [0.003, 0.8, 0.8][:dim])
+    matrix = turned((0.3, 0.2))[:dim, :dim] if dim == 3 else turned((0.3, 0.0))[:2, :2]
+    points = points @ matrix.T + [0.47, 0.49, 0.5][:dim]
+    fluid = make_fluid(uniform([0] * dim, [1] * dim, [4] * dim), [wall(linear_field(dim))],
+                       [body("plate", points, facets)], element="q1q1", scheme="steady")  # fmt: skip
+    assert fluid.grid.sheets is not None
+    put(fluid, linear_field(dim))
+    box = corners_of_box(dim)
+    for normal in ((0.2, 1, 0.1), (1, 0.8, -0.3), (1, 0.1, 0)):
+        point, n = (0.45, 0.51, 0.48)[:dim], normal[:dim]
+        whole = rate_of(section_of(box, point, n), n, dim)
+        found = flow_through(fluid, point, n)()[""]
+        hole = plate_in_box(points, point, n, dim)
+        assert found == pytest.approx(whole - hole, abs=1e-11), normal
+
+
+def plate_in_box(points, point, normal, dim):
+    """The rate through the part of a convex body in the unit box; its corners are those of its sides and of the box."""
+    in_box = np.concatenate([np.c_[np.eye(dim), -np.ones(dim)], np.c_[-np.eye(dim), np.zeros(dim)]])
+    sides = np.concatenate([ConvexHull(points).equations, in_box])
+    corners = HalfspaceIntersection(sides, points.mean(axis=0)).intersections
+    return rate_of(section_of(corners, point, normal), normal, dim)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_plane_without_bodies(dim):
+    fluid = make_fluid(uniform([0] * dim, [1] * dim, [3] * dim), [wall(linear_field(dim))], element="q2q1",
+                       scheme="steady")  # fmt: skip
+    put(fluid, linear_field(dim))
+    point, normal = (0.45, 0.51, 0.48)[:dim], (1, 0.8, -0.3)[:dim]
+    whole = rate_of(section_of(corners_of_box(dim), point, normal), normal, dim)
+    assert flow_through(fluid, point, normal)()[""] == pytest.approx(whole, abs=1e-12)
