@@ -38,8 +38,6 @@ PACKAGES_STAMP := .venv/debian-packages.stamp
 PROJECT_STAMP  := .venv/project.stamp
 DOCS_STAMP     := .venv/docs.stamp
 MODULES        := .venv/modules.txt
-# DOLFINx was compiled against the numpy that came with it, and needs its generation.
-NUMPY_OF_DOLFINX := $(BIN)/python -c 'import numpy; print("numpy<2" if numpy.__version__ < "2" else "numpy")'
 KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp solvers/kernels/*.map)
 VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel nodal_normals mortar_derivatives structure_patch \
   fluid_patch contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
@@ -63,7 +61,7 @@ $(PROJECT_STAMP): pyproject.toml $(KERNEL_SOURCES) $(MODULES) | $(PACKAGES_STAMP
 	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV_OPTIONS) .venv
 	@echo "setup: building and installing fsci into .venv"
 	$(INSTALL) nanobind scikit-build-core cmake ninja $(DOLFINX)
-	$(INSTALL) --editable '.[test]' "$$($(NUMPY_OF_DOLFINX))"
+	$(INSTALL) --editable '.[test]'
 	@$(BIN)/python -c 'from solvers.fem import calls'
 	@touch $@
 

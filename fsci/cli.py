@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -18,6 +18,8 @@ first steps:
   fsci check beam          is it right?
   fsci run beam            compute it; results in results/beam
   fsci plot results/beam   draw it
+
+`fsci demo` does all of this with an elastic ball that falls through a fluid.
 
 `mpirun -n 4 fsci run CASE` runs on four processes. `fsci COMMAND --help` tells more."""
 
@@ -34,7 +36,14 @@ def execute(arguments: Sequence[str]) -> int:
         from fsci.case.load import TRUST
 
         os.environ[TRUST] = "1"  # of this program, and of those that it starts
-    return int(options.command(options))
+    try:
+        return int(options.command(options))
+    except ImportError as error:
+        from fsci.dolfinx_needed import is_dolfinx, words
+
+        if not is_dolfinx(error):
+            raise
+        return _fail(f"fsci: {words(error)}")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -67,9 +76,15 @@ def _parser() -> argparse.ArgumentParser:
     new.add_argument("name", metavar="NAME", type=Path, help="folder to make")
     new.add_argument(
         "--template",
-        choices=("beam", "channel"),
+        choices=("beam", "channel", "ball"),
         default="beam",
-        help="what it computes: a swinging beam (default), or flow past a cylinder in a channel",
+        help="what it computes: a swinging beam (default), flow past a cylinder in a channel, or a ball that falls "
+        "through a fluid and bounces",
+    )
+
+    demo = command(_demo, "write, compute and draw a case in about a minute: a ball that falls through a fluid")
+    demo.add_argument(
+        "name", metavar="NAME", type=Path, nargs="?", default=Path("ball"), help="folder of the case (default: ball)"
     )
 
     for function, words in (
@@ -240,6 +255,17 @@ def _new(options: argparse.Namespace) -> int:
     return 0
 
 
+def _demo(options: argparse.Namespace) -> int:
+    from fsci.demo import DemoError, demo
+
+    try:
+        return demo(options.name, lambda line: print(line, flush=True))
+    except DemoError as error:
+        return _fail(f"fsci demo: {error}")
+    except (OSError, MemoryError, KeyboardInterrupt) as error:
+        return _broken("demo", error)
+
+
 def _check(options: argparse.Namespace) -> int:
     from fsci.case import CaseError, load_case
     from fsci.check.check import summary
@@ -286,16 +312,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.preview.preview import preview
 
-    try:
-        print("\n".join(preview(options.case, options.overrides, options.out)))
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, RuntimeError) as error:
-        return _fail(f"fsci preview: {error}")
-    return 0
+    return _printed("preview", lambda: preview(options.case, options.overrides, options.out))
 
 
 def _resume(options: argparse.Namespace) -> int:
@@ -319,70 +338,44 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.plot.picture import plot_run
 
     if not options.out.is_dir():
         return _fail(f"fsci plot: there is no folder '{options.out}'")
-    try:
-        files = plot_run(
+    return _printed(
+        "plot",
+        lambda: plot_run(
             options.out, movie=options.movie, field=options.field, times=options.times, mirrors=options.mirrors
-        )
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, ValueError, RuntimeError) as error:
-        return _fail(f"fsci plot: {error}")
-    print("\n".join(str(path) for path in files))
-    return 0
+        ),
+    )
 
 
 def _report(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.report.report import write_report
 
-    try:
-        print(write_report(options.out))
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, ValueError, RuntimeError) as error:
-        return _fail(f"fsci report: {error}")
-    return 0
+    return _printed("report", lambda: [write_report(options.out)])
 
 
 def _explain(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.explain.explain import explain
 
-    try:
-        print(explain(options.out, options.replay))
-    except CaseError as error:
-        return _fail(str(error))
-    except (OSError, ValueError) as error:
-        return _fail(f"fsci explain: {error}")
-    return 0
+    return _printed("explain", lambda: [explain(options.out, options.replay)])
 
 
 def _twin(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.twin.twin import run_twins
 
-    try:
-        right = run_twins(options.case, tuple(options.overrides), options.out, only=options.only, quickly=options.quick)
-    except CaseError as error:
-        return _fail(str(error))
-    except KeyboardInterrupt:
-        return _fail("stopped; the same command goes on from here") + 1
-    except OSError as error:
-        return _fail(f"fsci twin: {error}")
-    return int(not right)
+    overrides = tuple(options.overrides)
+    return _several(
+        "twin", lambda: run_twins(options.case, overrides, options.out, only=options.only, quickly=options.quick)
+    )
 
 
 def _converge(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.converge.converge import converge
 
-    try:
-        right = converge(
+    def right() -> bool:
+        return converge(
             options.case,
             tuple(options.overrides),
             options.out,
@@ -391,42 +384,50 @@ def _converge(options: argparse.Namespace) -> int:
             budget=options.budget,
             say=lambda line: print(line, flush=True),
         )
-    except CaseError as error:
-        return _fail(str(error))
-    except KeyboardInterrupt:
-        return _fail("stopped; the same command goes on from here") + 1
-    except OSError as error:
-        return _fail(f"fsci converge: {error}")
-    return int(not right)
+
+    return _several("converge", right)
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.sweep.sweep import sweep
 
+    return _several(
+        "sweep", lambda: sweep(options.case, options.overrides, options.out, lambda line: print(line, flush=True))
+    )
+
+
+def _several(name: str, right: Callable[[], bool]) -> int:
+    """A command that makes several runs; those that are there are not repeated."""
+    from fsci.case import CaseError
+
     try:
-        right = sweep(options.case, options.overrides, options.out, lambda line: print(line, flush=True))
+        return int(not right())
     except CaseError as error:
         return _fail(str(error))
     except KeyboardInterrupt:
         return _fail("stopped; the same command goes on from here") + 1
     except OSError as error:
-        return _fail(f"fsci sweep: {error}")
-    return int(not right)
+        return _fail(f"fsci {name}: {error}")
 
 
 def _diff(options: argparse.Namespace) -> int:
-    from fsci.case import CaseError
     from fsci.diff import diff
 
     if len(options.outs) < 2:
         return _fail("fsci diff: give the folders of two or more runs")
+    return _printed("diff", lambda: diff(options.outs, options.pictures))
+
+
+def _printed(name: str, make: Callable[[], Iterable[object]]) -> int:
+    """A command that prints lines or the files that it has made."""
+    from fsci.case import CaseError
+
     try:
-        print("\n".join(diff(options.outs, options.pictures)))
+        print("\n".join(str(line) for line in make()))
     except CaseError as error:
         return _fail(str(error))
-    except (OSError, ValueError) as error:
-        return _fail(f"fsci diff: {error}")
+    except (OSError, ValueError, RuntimeError) as error:
+        return _fail(f"fsci {name}: {error}")
     return 0
 
 

@@ -124,15 +124,85 @@ Other settings without editing, here for a vortex street at Reynolds number 100:
     fsci run {folder} --set fluid.viscosity=2e-4 --set time.end=15 --set verify=[] -o results/vortices
 """
 
-TEMPLATES = {"beam": (BEAM, BEAM_README), "channel": (CHANNEL, CHANNEL_README)}
+BALL = """\
+# An elastic ball (in 2D: a disc) falls through a fluid on the bottom of a box and bounces.
+# Check it:    fsci check {folder}
+# Run it:      fsci run {folder}
+# See it:      fsci plot results/{name} --movie
+# All settings: fsci schema --markdown
+title: {name}
+time: {{step: 0.02, end: 4}}
+
+fluid:
+  density: 1
+  viscosity: 0.01
+  scheme: backward_euler
+  # The grid is a box, and stays where it is: the ball cuts its cells.
+  grid: {{from: [-1.5, 0], to: [1.5, 3], cells: [20, 20]}}
+  patches:
+    surface: {{on: y+, outflow: true}}
+    walls: {{on: [x-, x+, y-], no_slip: true}}
+
+structure:
+  dynamics: {{rho_inf: 0.8}}
+  bodies:
+    ball:
+      mesh: {{shape: disc, radius: 0.5, cells: [32, 2], translate: [0, 1.5]}}
+      material: {{law: neo_hooke, E: 4000, nu: 0.3, density: 20}}
+      gravity: [0, -1]
+
+contact:
+  obstacles:
+    bottom: {{mesh: {{shape: rectangle, size: [3, 0.1], cells: [1, 1], origin: [-1.5, -0.1]}}, on: top}}
+  pairs:
+    bottom: {{slave: {{body: ball, on: outer}}, master: {{obstacle: bottom}}}}
+
+coupling: {{scheme: monolithic}}
+
+# Every step writes these to history.csv.
+probes:
+  ball: {{field: structure, body: ball, quantity: centre}}
+  force: {{field: fluid, body: ball, quantity: force}}
+  energy: {{field: structure, quantity: energy}}
+
+output: {{fields_every: 4}}
+
+# The run fails if it misses these: results of this program on this grid, of the first jump and the deepest place.
+verify:
+  - {{value: ball.y, statistic: max, from: 1.7, reference: 0.854, absolute: 0.02, regression: true}}
+  - {{value: ball.y, statistic: min, reference: 0.430, absolute: 0.005, regression: true}}
+"""
+
+BALL_README = """\
+# {name}
+
+An elastic ball of 1 m, 20 times as dense as the fluid, falls 1 m to the bottom of a box,
+touches it, and jumps up again.
+
+    fsci check {folder}                  # is the case right?
+    fsci run {folder}                    # results in results/{name}
+    fsci plot results/{name} --movie     # pictures
+
+In a thinner fluid it jumps higher:
+
+    fsci run {folder} --set fluid.viscosity=0.003 --set verify=[] -o results/thinner
+"""
+
+TEMPLATES = {"beam": (BEAM, BEAM_README), "channel": (CHANNEL, CHANNEL_README), "ball": (BALL, BALL_README)}
+
+
+def texts(folder: Path, template: str) -> dict[Path, str]:
+    """The files of a commented case that runs, and what stands in them."""
+    case, readme = TEMPLATES[template]
+    name = folder.absolute().name
+    files = {folder / "case.yaml": case, folder / "README.md": readme}
+    return {path: text.format(name=name, folder=folder) for path, text in files.items()}
 
 
 def new_case(folder: Path, template: str = "beam") -> list[Path]:
     """Write a commented case that runs; raises FileExistsError rather than overwrite anything."""
     folder.mkdir(parents=True)
-    name = folder.absolute().name
-    case, readme = TEMPLATES[template]
-    files = {folder / "case.yaml": case, folder / "README.md": readme}
+    files = texts(folder, template)
     for path, text in files.items():
-        path.write_text(text.format(name=name, folder=folder), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
     return list(files)

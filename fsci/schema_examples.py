@@ -115,6 +115,7 @@ EXAMPLES = {
     "Probe": "probes:\n  tip: {quantity: displacement, at: [1, 0.05]}\n  clamp: {quantity: reaction, on: left}\n"
     "  drag: {quantity: drag_coefficient, body: cylinder, reference: {velocity: 0.2, length: 0.1}}\n"
     "  gap: {quantity: gap, pair: floor}",
+    "Plane": "plane: {point: [0.5, 0], normal: [1, 0]}",
     "Reference": "reference: {velocity: 0.2, length: 0.1}",
     "Output": "output: {fields_every: 5, checkpoint_every: 20}",
     "Check": "verify:\n  - {value: tip.y, statistic: min, reference: -0.0661, relative: 0.001}\n"

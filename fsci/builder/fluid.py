@@ -22,6 +22,7 @@ from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid.flow import probes
 from solvers.fluid.flow.extreme_pressure import extreme_pressure
 from solvers.fluid.flow.field import Fluid
+from solvers.fluid.flow.section import flow_through
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.surfaces.immersed import ImmersedBody, rigid_body
@@ -155,6 +156,12 @@ def _on_patch(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return probes.on_patch(forces.fluid, settings.quantity, settings.on or settings.through or "")
 
 
+def _through_plane(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    plane = case.probes[name].plane
+    assert plane is not None
+    return flow_through(forces.fluid, plane.point, plane.normal)
+
+
 def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return probes.of_outlet(forces.fluid, case.probes[name].through or "")
 
@@ -184,10 +191,12 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", "at"): _at,
     ("pressure", "on"): _on_patch,
     ("flow_rate", "through"): _on_patch,
+    ("flow_rate", "plane"): _through_plane,
     ("outlet_pressure", "through"): _of_outlet,
     ("pressure", ""): _extreme,
     ("force", ""): _force,
     ("moment", ""): _force,
+    ("power", ""): _force,
     ("drag_coefficient", ""): _coefficient,
     ("lift_coefficient", ""): _coefficient,
     ("volume", ""): _whole,

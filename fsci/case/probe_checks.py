@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 from fsci.case.case import Case
 from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import FluidSection
+from fsci.case.grid import GridSection
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
-from fsci.case.probes import RESERVED_COLUMNS, Probe, Reference
+from fsci.case.probes import RESERVED_COLUMNS, PlaneSection, Probe, Reference
 from fsci.case.structure import StructureSection
 from fsci.case.verify import (
     BODY_COLUMN,
@@ -111,6 +113,8 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
             yield (*keys, "through"), f"the patch '{probe.through}' is neither a 'resistance' nor a 'windkessel'"
     if probe.reference is not None:
         yield from _reference(probe.reference, grid.dimension, (*keys, "reference"))
+    if probe.plane is not None:
+        yield from _plane(probe.plane, grid, (*keys, "plane"))
     yield from length_mistakes(probe.about, grid.dimension, (*keys, "about"))
     yield from length_mistakes(probe.minus, grid.dimension, (*keys, "minus"))
     for key in ("at", "minus"):
@@ -119,6 +123,23 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
         if point is not None and not all(low <= x <= high for low, x, high in inside):
             place = ", ".join(f"{x:g}" for x in point)
             yield (*keys, key), f"the point ({place}) is outside of the fluid's box"
+
+
+def _plane(plane: PlaneSection, grid: GridSection, keys: Keys) -> Iterator[Mistake]:
+    wrong = [
+        *length_mistakes(plane.point, grid.dimension, (*keys, "point")),
+        *length_mistakes(plane.normal, grid.dimension, (*keys, "normal")),
+    ]
+    yield from wrong
+    if wrong:
+        return
+    if not any(plane.normal):
+        yield (*keys, "normal"), "the normal of a plane must not be zero"
+        return
+    corners = product(*zip(grid.start, grid.to, strict=True))
+    sides = [sum(n * (x - p) for n, x, p in zip(plane.normal, at, plane.point, strict=True)) for at in corners]
+    if not min(sides) < 0.0 < max(sides):
+        yield keys, "the plane does not pass through the inside of the fluid's box; on its faces are patches: 'through'"
 
 
 def _reference(reference: Reference, dimension: int, keys: Keys) -> Iterator[Mistake]:

@@ -35,6 +35,13 @@ class Reference(Section):
     )  # fmt: skip
 
 
+class PlaneSection(Section):
+    """A plane through the box of a flow, in 2D a line."""
+
+    point: NumberVector = setting(..., "a point of it", unit="m")
+    normal: NumberVector = setting(..., "direction at a right angle to it, in which a flow rate is positive", unit="1")
+
+
 class Probe(Section):
     __doc__ = f"""A quantity that every step writes to history.csv.
 
@@ -68,6 +75,7 @@ column NAME. In 2D everything is per unit of depth.
         None, "another point of the fluid, whose value is subtracted from that of `at`", unit="m"
     )
     through: Text | None = setting(None, "name of a patch of the fluid")
+    plane: PlaneSection | None = setting(None, "plane through the fluid")
     pair: Name | None = setting(None, "name of a contact pair")
     extreme: Literal["largest", "least"] | None = setting(
         None, "of all slave nodes of the pair, or of all fluid; default: the least gap, the largest pressure"
@@ -77,7 +85,7 @@ column NAME. In 2D everything is per unit of depth.
 
     @property
     def place(self) -> str:
-        """The setting of the location: pair, at, on, through or none."""
+        """The setting of the location: pair, at, on, through, plane or none."""
         return next((name for name in LOCATIONS if getattr(self, name) is not None), "")
 
     @property

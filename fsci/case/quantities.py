@@ -10,7 +10,13 @@ Field = Literal["structure", "fluid", "rigid"]
 FIELDS: tuple[Field, ...] = ("structure", "fluid", "rigid")
 
 #: Setting of a location -> its name in messages.
-LOCATIONS = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
+LOCATIONS = {
+    "pair": "'pair: PAIR'",
+    "at": "'at: [..]'",
+    "on": "'on: SURFACE'",
+    "through": "'through: PATCH'",
+    "plane": "'plane: {point: [..], normal: [..]}'",
+}
 WHOLE = ""  #: none of them: a body, or all fluid
 
 ENERGIES = ("kinetic", "internal", "work", "total")
@@ -47,6 +53,7 @@ class Quantity:
 
 
 _LENGTH, _SPEED, _FORCE, _ENERGY, _STRESS = (1, 0, 0), (1, 0, -1), (1, 1, -2), (2, 1, -2), (-1, 1, -2)
+_POWER = (2, 1, -3)
 _QUANTITIES = (
     Quantity(
         "displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area", rigid=("at",)
@@ -87,14 +94,22 @@ _QUANTITIES = (
     Quantity("mass", (0, 1, 0), "one", (WHOLE,), needs=("density",), rigid=(WHOLE,)),
     Quantity("volume", (3, 0, 0), "one", (WHOLE,), (WHOLE,)),
     Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass", rigid=(WHOLE,)),
-    Quantity("flow_rate", (3, 0, -1), "one", (), ("through",), meaning="volume per time, out of the box"),
+    Quantity(
+        "flow_rate",
+        (3, 0, -1),
+        "one",
+        (),
+        ("through", "plane"),
+        meaning="volume per time, out of the box or along the normal",
+    ),
     Quantity("outlet_pressure", _STRESS, "one", (), ("through",), meaning="of a `resistance` or `windkessel`"),
     Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),
+    Quantity("power", _POWER, "one", (), (WHOLE,), ("body",), "of that force, with the velocity of its surface"),
     Quantity("drag_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
     Quantity("lift_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
     Quantity("kinetic_energy", _ENERGY, "one", (), (WHOLE,), meaning="of all fluid"),
-    Quantity("dissipation", (2, 1, -3), "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
+    Quantity("dissipation", _POWER, "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
 )
 QUANTITIES = {quantity.name: quantity for quantity in _QUANTITIES}
 
@@ -110,6 +125,7 @@ def _lines(field: Field) -> Iterator[str]:
         "on": f"with `on`, on a {'surface' if field == 'structure' else 'patch'}",
         "pair": "with `pair`, of a contact pair",
         "through": "with `through`, through a patch",
+        "plane": "with `plane`, through the part of a plane, in 2D of a line, that is in the fluid",
         WHOLE: "with none of them, of the whole",
     }
     for place, beginning in words.items():

@@ -42,7 +42,6 @@ POWERS = {
     "contact_pressure": (-1, 1, -2),
     **dict.fromkeys(("contact_traction", "traction", "wall_shear_stress"), (-1, 1, -2)),
     "contact_gap": (1, 0, 0),
-    "power": (2, 1, -3),
 }
 
 #: Balances in the history -> their titles; all vanish without errors of solvers and time steps.

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from fsci.plot.frames import Moment, draw_frames
 from fsci.plot.render import DrawnBody, Pixels
 from fsci.plot.render_flow import load_state
-from fsci.plot.scene import animate, compose
+from fsci.plot.scene import compose
 from fsci.running.files import replacing
 
 FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
@@ -16,22 +21,35 @@ MOVIE_DOTS = 120  #: pixels per inch: 960 x 600
 MILLISECONDS = 50  #: per frame
 
 
-def plot_movie(
-    path: Path, moments: Sequence[Sequence[tuple[float, Path]]], field: str, title: str, units: Mapping[str, str]
-) -> Path:
-    """Animates all bodies, coloured by a field, as a GIF; `moments`: (time, file) of each body at each time."""
+def plot_movie(folder: Path, moments: Sequence[Moment], field: str, title: str, units: Mapping[str, str]) -> list[Path]:
+    """Animates all bodies, coloured by a field, as movie.gif, and as movie.mp4 where there is a program that writes it.
+
+    `moments`: (time, file) of each body at each time. Returns the files.
+    """
     shown = moments[:: -(-len(moments) // FRAMES)]
 
-    def states() -> Iterator[tuple[float, list[DrawnBody]]]:
+    def extents() -> Iterator[list[DrawnBody]]:
         for moment in shown:
-            yield moment[0][0], load_state([file for _, file in moment], field)
+            yield load_state([file for _, file in moment], field, lines=False)
 
-    scene = compose((state for _, state in states()), field, title, units)
-    write_gif(path, animate(scene, states(), dots=MOVIE_DOTS))
-    return path
+    scene = compose(extents(), field, title, units)
+    frames = []
+    for pixels in draw_frames(scene, shown, field, MOVIE_DOTS):
+        frames.append(pixels)
+        say_progress(len(frames), len(shown))
+    files = [write_gif(folder / "movie.gif", frames)]
+    if (encoder := find_encoder()) is not None:
+        files.append(write_mp4(folder / "movie.mp4", frames, encoder))
+    return files
 
 
-def write_gif(path: Path, frames: Iterable[Pixels]) -> None:
+def say_progress(done: int, count: int) -> None:
+    """One line of a terminal, written over again."""
+    if sys.stderr.isatty():
+        print(f"\rmovie: frame {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
+
+
+def write_gif(path: Path, frames: Sequence[Pixels]) -> Path:
     """Writes a GIF that repeats for ever; all frames have the colours of the last one, the fullest in most runs."""
     from PIL import Image
 
@@ -41,3 +59,40 @@ def write_gif(path: Path, frames: Iterable[Pixels]) -> None:
     options: Any = {"save_all": True, "append_images": images[1:], "duration": MILLISECONDS, "loop": 0}
     with replacing(path) as unfinished:
         images[0].save(unfinished, format="GIF", **options)
+    return path
+
+
+def find_encoder() -> str | None:
+    """The program ffmpeg, installed or that of the package imageio-ffmpeg; None without both."""
+    if (found := shutil.which("ffmpeg")) is None and find_spec("imageio_ffmpeg") is not None:
+        import imageio_ffmpeg
+
+        found = imageio_ffmpeg.get_ffmpeg_exe()
+    return found
+
+
+def write_mp4(path: Path, frames: Sequence[Pixels], encoder: str) -> Path:
+    """Writes an MP4 by ffmpeg, with a white row or column more where its format needs an even number of them.
+
+    Raises RuntimeError with what ffmpeg says.
+    """
+    height, width, _ = frames[0].shape
+    given = [
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        f"{1000 / MILLISECONDS:g}",
+        "-i",
+        "-",
+    ]
+    even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    with replacing(path) as unfinished:
+        program = [encoder, "-loglevel", "error", "-y", *given, *even, "-f", "mp4", str(unfinished)]
+        done = subprocess.run(program, input=b"".join(pixels.tobytes() for pixels in frames), capture_output=True)
+        if done.returncode:
+            raise RuntimeError(f"{encoder} cannot write a movie: {done.stderr.decode(errors='replace').strip()}")
+    return path

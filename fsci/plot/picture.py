@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fsci.plot.curves import CURVE_DOTS, plot_convergence, plot_history, save_figure
+from fsci.plot.frames import Moment
 from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
@@ -27,8 +28,6 @@ FLUID_FIELDS = ("velocity", "pressure")
 CONTACT_PRESSURE = "contact_pressure"
 SIDEWAYS = 0.8  #: sideways component of the view of a contact surface, relative to its normal
 FLOW_CROP = 1.0  #: percent of the points of a flow in space whose values may lie above the colour bar
-
-Moment = tuple[tuple[float, Path], ...]  #: (time, VTU file) of each part at one output time
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
         if not field:
             drawn += plot_more(folder, moments, labels, flow=flow)
         if movie:
-            drawn.append(plot_movie(folder / "movie.gif", moments, names[0], labels.title, labels.units))
+            drawn += plot_movie(folder, moments, names[0], labels.title, labels.units)
     if (out / "history.csv").exists():
         drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units)
     if (out / "summary.json").exists():

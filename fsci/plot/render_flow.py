@@ -21,6 +21,7 @@ BODY_SEEDS = 6  #: and from so many along each edge of a rectangle
 SEEDED_EXTENT = 1.2  #: that is so many times as large as a body
 SLICE_WITH_TUBES, SLICE = 0.3, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
 TUBES = 0.0025  #: their radius, as part of the box's diagonal
+SIDES = 8  #: of tubes a few pixels wide
 LINE, TRIANGLE = 3, 5  #: VTK's numbers of cell types
 
 NO_LINES = np.empty((0, 2, 3))
@@ -31,8 +32,11 @@ def is_flow(path: Path) -> bool:
     return "fluid_fraction" in import_pyvista().read(path).cell_data
 
 
-def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
-    """The drawn parts of the VTU files of one time, flow first; bodies in a flow that has the field are grey."""
+def load_state(files: Sequence[Path], field: str, *, lines: bool = True) -> list[DrawnBody]:
+    """The drawn parts of the VTU files of one time, flow first; bodies in a flow that has the field are grey.
+
+    lines: with streamlines in the plane, which change neither colours nor size.
+    """
     meshes = [import_pyvista().read(path) for path in files]
     flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
     parts = [part for mesh in meshes if mesh is not flow for part in _load_body(mesh, field)]
@@ -41,7 +45,7 @@ def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
     if field_values(flow.point_data, field) is not None:
         parts = [replace(part, values=None) for part in parts]
     if is_flat(flow):
-        return [plane_flow(flow, field), *parts]
+        return [plane_flow(flow, field, lines=lines), *parts]
     # The edges of elements would hide the flow around a body.
     bodies = [replace(part, edges=NO_LINES) for part in _opened(parts, flow)]
     return _spatial_flow(flow, field, [mesh for mesh in meshes[1:] if not surrounds(mesh, flow)]) + bodies
@@ -112,11 +116,11 @@ def is_flat(mesh: Any) -> bool:
     return bool(high[2] - low[2] <= 1e-9 * (high - low).max())
 
 
-def plane_flow(mesh: Any, field: str) -> DrawnBody:
+def plane_flow(mesh: Any, field: str, *, lines: bool = True) -> DrawnBody:
     """A 2D flow, with streamlines if the field is its velocity."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
-    lines = _plane_streamlines(mesh) if field.partition(".")[0] == STREAMLINES else NO_LINES
-    return DrawnBody(surface, lines, NO_LINES, field_values(surface.point_data, field), line_colour="white")
+    streamlines = _plane_streamlines(mesh) if lines and field.partition(".")[0] == STREAMLINES else NO_LINES
+    return DrawnBody(surface, streamlines, NO_LINES, field_values(surface.point_data, field), line_colour="white")
 
 
 def _plane_streamlines(mesh: Any) -> Array:
@@ -224,7 +228,7 @@ def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
         max_steps=5000,
         max_length=mesh.length,  # a closed streamline would go round for ever
     )
-    return lines.tube(radius=TUBES * mesh.length) if lines.n_points else lines
+    return lines.tube(radius=TUBES * mesh.length, n_sides=SIDES) if lines.n_points else lines
 
 
 def _inside(points: Array, surface: Any) -> NDArray[np.bool_]:

@@ -27,7 +27,9 @@ AXIS_NAMES = "xyz"
 #: Sections with places or directions.
 SECTIONS_WITH_PLACES = ("structure", "fluid", "rigid_section", "contact", "coupling", "probes")
 #: Lists of numbers that are points or vectors.
-TURNING_VECTORS = ("at", "minus", "about", "centre", "direction", "initial_velocity", "dry_side", "box", "pivot")
+TURNING_VECTORS = (
+    *("at", "minus", "about", "centre", "direction", "initial_velocity", "dry_side", "box", "pivot", "point", "normal"),
+)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ else:
 
     if not hasattr(fem, "create_form"):
         raise ImportError(
-            "this version of DOLFINx is not supported: install 0.5 (Debian 12), or 0.9 (Debian 13) and later"
+            "this version of DOLFINx is not supported: install 0.5 (Debian 12), or 0.9 (Debian 13) and later",
+            name="dolfinx",
         )
     from solvers.fem import nanobind as calls  # type: ignore[no-redef]
 

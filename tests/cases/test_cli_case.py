@@ -74,6 +74,38 @@ def test_new_writes_a_flow_too():
     assert "fsci run channel" in Path("channel/README.md").read_text()
 
 
+def test_new_writes_contact_in_a_flow_too():
+    assert execute(["new", "ball", "--template", "ball"]) == 0
+    case = load_case("ball")
+    assert case.warnings == ()
+    assert case.coupling is not None
+    assert list(case.contact.pairs) == ["bottom"]
+
+
+def test_demo_takes_its_own_unchanged_case_alone(capsys):
+    assert execute(["new", "ball", "--template", "ball"]) == 0
+    Path("ball/case.yaml").write_text("mine")
+    assert execute(["demo"]) == 2
+    message = "fsci demo: 'ball' is there, and is not this case as it was written: name another folder\n"
+    assert capsys.readouterr().err == message
+    assert Path("ball/case.yaml").read_text() == "mine"
+
+
+def test_demo_runs_its_case_and_draws_what_is_finished(calls, monkeypatch, capsys):
+    """Of a run that fails or stops nothing is drawn. The case that is there is taken again."""
+    monkeypatch.delitem(sys.modules, "fsci.demo", raising=False)
+    assert execute(["demo", "drop"]) == 1
+    assert [(name, arguments[1:]) for name, arguments, _ in calls] == [("run", (Path("results/drop"),))]
+    monkeypatch.setattr(sys.modules["fsci.running.run"], "run_case", lambda case, out: 0)
+    monkeypatch.delitem(sys.modules, "fsci.demo")
+    assert execute(["demo", "drop"]) == 0
+    assert calls[1:] == [("plot", (Path("results/drop"),), {"movie": True})]
+    assert capsys.readouterr().out.splitlines()[-2:] == [
+        "$ fsci plot results/drop --movie",
+        "Change drop/case.yaml and run it again, or open results/drop/fields in ParaView.",
+    ]
+
+
 def test_new_overwrites_nothing(beam, capsys):
     (beam / "case.yaml").write_text("mine")
     assert execute(["new", "beam"]) == 2

@@ -41,6 +41,7 @@ probes:
   u: {quantity: velocity, at: [0.83, 0.61]}
   dp: {quantity: pressure, at: [-0.1, 0.4], minus: [1.6, 0.2]}
   out: {quantity: flow_rate, through: upper}
+  across: {quantity: flow_rate, plane: {point: [0.71, 0.3], normal: [2, 1]}}
 """
 
 #: A free body with springs, and the wall that it meets.

@@ -46,6 +46,8 @@ probes:
   aside: {quantity: velocity, at: [1, 0.65]}
   covered: {quantity: pressure, at: [1.22, 0.58]}
   dp: {quantity: pressure, at: [0.1, 0.5], minus: [1.9, 0.5]}
+  across: {quantity: flow_rate, plane: {point: [1, 0.5], normal: [1, 0.3]}}
+  driven: {quantity: power, body: paddle}
   energy: {quantity: kinetic_energy}
   power: {quantity: dissipation}
   volume: {quantity: volume}
@@ -81,6 +83,9 @@ probes:
   lift: {quantity: lift_coefficient, reference: {velocity: 0.5, length: 0.3, drag: [3, 4]}}
   moment: {quantity: moment}
   out: {quantity: flow_rate, through: east}
+  upright: {quantity: flow_rate, plane: {point: [0.6, 1], normal: [3, 0]}}
+  slanted: {quantity: flow_rate, plane: {point: [0.66, 0.97], normal: [-1, -1]}}
+  gain: {quantity: power}
   mean: {quantity: pressure, on: west}
   energy: {quantity: kinetic_energy}
   power: {quantity: dissipation}
@@ -118,6 +123,9 @@ def test_probes_of_a_flow_known_in_closed_form(element, tmp_path):
         "lift": (-4 * -0.8 - 2 * 0.6) * 0.09 / (0.5 * 2 * 0.5**2 * 0.3),
         "moment": 0.09 * (-2 * centre[0] + 4 * centre[1]),
         "out": 4,
+        "upright": 2 * (2 - 0.3),
+        "slanted": -3 / np.sqrt(2) * (np.sqrt(2) - 0.3 * np.sqrt(2)),  # along a diagonal of the square
+        "gain": -4 * 0.09 * 2 - 2 * 0.09 * 1,
         "mean": 6,
         "energy": 0.5 * 2 * 5 * volume,
         "power": 0,

@@ -202,7 +202,42 @@ MISTAKES = [
         "[4",
     ),
     ("through: outlet", "through: outled", "19:39: unknown patch 'outled'; did you mean 'outlet'?", "outled"),
-    (", through: outlet", "", "19:19: quantity 'flow_rate' needs 'through: PATCH'", "flow_rate"),
+    (
+        ", through: outlet",
+        "",
+        "19:19: quantity 'flow_rate' needs 'through: PATCH' or 'plane: {point: [..], normal: [..]}'",
+        "flow_rate",
+    ),
+    (
+        "through: outlet",
+        "plane: {point: [1, 0.5], normal: [0, 0]}",
+        "19:63: the normal of a plane must not be zero",
+        "[0, 0",
+    ),
+    (
+        "through: outlet",
+        "plane: {point: [1, 0.5], normal: [1, 0, 0]}",
+        "19:63: 'normal' must have 2 entries in 2D, not 3",
+        "[1, 0, 0",
+    ),
+    (
+        "through: outlet",
+        "plane: {pont: [1, 0.5], normal: [1, 0]}",
+        "19:38: unknown setting 'pont'; did you mean 'point'?",
+        "pont",
+    ),
+    (
+        "through: outlet",
+        "plane: {point: [4, 0.5], normal: [1, 0]}",
+        "19:37: the plane does not pass through the inside of the fluid's box; on its faces are patches: 'through'",
+        "{point",
+    ),
+    (
+        "through: outlet",
+        "through: outlet, plane: {point: [1, 0.5], normal: [1, 0]}",
+        "19:54: give either 'through' or 'plane', not both",
+        "{point",
+    ),
     (
         "{quantity: flow_rate",
         "{field: structure, quantity: flow_rate",

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from fsci.plot import movie
 from fsci.plot.curves import contact_panels, label, plot_history
 from fsci.plot.picture import plot_run
 from fsci.plot.render import axes_of_view, frame, load_body, render
@@ -122,8 +123,10 @@ def test_units():
     assert label("my_level", "level", SI) == "my level"
 
 
-def test_a_run_is_drawn_from_its_folder(tmp_path):
+def test_a_run_is_drawn_from_its_folder(tmp_path, monkeypatch):
     from PIL import Image
+
+    monkeypatch.setattr(movie, "find_encoder", lambda: None)  # of another test
 
     fields = FieldWriter(tmp_path / "fields")
     history = HistoryWriter(tmp_path / "history.csv")

@@ -10,6 +10,7 @@ from fsci.plot.curves import label
 from fsci.schema import reference_markdown
 
 WHERE = {"at": [0.5, 0.5], "on": "left", "pair": "touch", "through": "outlet"}
+WHERE["plane"] = {"point": [0.5, 0.5], "normal": [1, 0]}
 UNITS = {"length": "mm", "mass": "t", "time": "s"}
 
 
@@ -63,4 +64,4 @@ def test_the_input_reference_tells_all():
     page = reference_markdown()
     for name in QUANTITIES:
         assert f"`{name}`" in page
-    assert "- with `through`, through a patch: flow_rate (volume per time, out of the box)" in page
+    assert "- with `through`, through a patch: flow_rate (volume per time, out of the box or along the normal)" in page

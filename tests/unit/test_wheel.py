@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import sysconfig
 import tomllib
 import zipfile
 from pathlib import Path
@@ -42,6 +43,19 @@ sys.meta_path = [finder for finder in sys.meta_path if not type(finder).__module
 """
 
 
+#: A program `python -c ... COMMAND` for which what DOLFINx brings does not exist.
+WITHOUT_DOLFINX = """\
+import sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("dolfinx", "basix", "ufl", "ffcx", "petsc4py", "mpi4py"):
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+sys.meta_path.insert(0, Hidden())
+from fsci.cli import main
+main()
+"""
+
+
 def modules_of_the_repository() -> set[str]:
     """As they are called in the wheel."""
     found = set()
@@ -55,9 +69,9 @@ def modules_of_the_repository() -> set[str]:
 DATA = {"fsci/resolution/table.json", "fsci/stress/scenes.yaml", "fsci/stress/cases.yaml"}
 
 
-@pytest.mark.slow
-def test_wheel(tmp_path):
-    """One top-level package with all modules and the kernels; it imports and computes, and knows its version."""
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
     build = [
         "pip",
         "wheel",
@@ -67,10 +81,16 @@ def test_wheel(tmp_path):
         "--config-settings",
         "cmake.build-type=Debug",
     ]
-    build += ["--config-settings", f"build-dir={tmp_path / 'build'}", "-w", str(tmp_path), str(ROOT)]
+    build += ["--config-settings", f"build-dir={folder / 'build'}", "-w", str(folder), str(ROOT)]
     done = subprocess.run([sys.executable, "-m", *build], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    (wheel,) = tmp_path.glob("*.whl")
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.mark.slow
+def test_wheel(tmp_path, wheel):
+    """One top-level package with all modules and the kernels; it imports and computes, and knows its version."""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert wheel.name.startswith(f"fsci-{version}-cp")
 
@@ -99,3 +119,31 @@ def test_wheel(tmp_path):
     assert done.returncode == 0, done.stderr
     done = subprocess.run([*run[:3], "--version"], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.stdout.split() == ["fsci", version]
+
+
+@pytest.mark.slow(seconds=150)
+def test_installed_program(tmp_path, wheel):
+    """In a new virtual environment of the system's Python it writes, computes and draws its demonstration.
+
+    Python packages that it needs are those of the environment of the tests, whose fsci is not seen.
+    """
+    base = f"{sys.base_prefix}/bin/python3"
+    subprocess.run([base, "-m", "venv", "--system-site-packages", tmp_path / "venv"], check=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    install = [python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", wheel]
+    done = subprocess.run(install, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (site,) = (tmp_path / "venv").glob("lib/python*/site-packages")
+    (site / "packages_of_the_tests.pth").write_text(sysconfig.get_path("purelib") + "\n")
+
+    fsci = [python.parent / "fsci"]
+    done = subprocess.run([*fsci, "demo"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for picture in ("movie", "story_velocity.png", "history_ball.png", "history_contact.png", "history_energy.png"):
+        assert f"results/ball/pictures/{picture}" in done.stdout
+        assert list((tmp_path / "results/ball/pictures").glob(f"{picture}*"))
+
+    hidden = [python, "-c", WITHOUT_DOLFINX, "run", "ball"]
+    done = subprocess.run(hidden, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"fsci: there is no DOLFINx for {python}: the module 'mpi4py' is missing\n")

@@ -246,7 +246,10 @@ class Forces:
         self._step: Step | None = None  #: that these forces belong to
 
     def probe(self, quantity: str, body: str | None, about: Sequence[float] | None = None) -> Probe:
-        """Probe of the force [N] on a body (None: on all), or of its moment [N m] about a point (None: the origin)."""
+        """Probe of the force [N] on a body, its moment [N m] about a point (None: the origin), or its power [W].
+
+        body: None for all.
+        """
         fluid = self.fluid
         names = [body] if body is not None else [b.surface.name for b in fluid.bodies]
         vertices = fluid.moving.surfaces.vertices_of(names)
@@ -256,6 +259,8 @@ class Forces:
             force = self._on(names)
             if quantity == "force":
                 return _components(force.sum(axis=0))
+            if quantity == "power":
+                return {"": float((force * fluid.cut.motion.v[vertices]).sum())}
             x = fluid.cut.motion.x[vertices]
             arms, forces = (np.pad(a, ((0, 0), (0, 3 - fluid.dim))) for a in (x - centre, force))
             moment = np.cross(arms, forces).sum(axis=0)
