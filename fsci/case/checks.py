@@ -113,6 +113,9 @@ def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:
         yield ("structure", "plane"), "'plane' is for 2D, but the mesh is 3D"
     elif structure.plane == "stress":
         for name, body in structure.bodies.items():
+            if body.material.viscous:
+                keys = ("structure", "bodies", name, "material", "viscous")
+                yield keys, "'viscous' is not available in plane stress, where the thickness would relax, too"
             if body.material.law != "st_venant_kirchhoff" and body.kinematics == "finite":
                 keys = ("structure", "bodies", name, "material", "law")
                 yield keys, f"plane stress needs the law 'st_venant_kirchhoff', not '{body.material.law}'"

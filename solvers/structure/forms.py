@@ -30,9 +30,9 @@ def tangent(u: Tensor, element: Element, v: Tensor, du: Tensor, dx: ufl.Measure)
 
 
 def first_piola_kirchhoff(u: Tensor, element: Element) -> Tensor:
-    """P = dW/dF [Pa]."""
+    """P = dW/dF [Pa], at any point after `element.prepare_output()`."""
     F = ufl.variable(deformation_gradient(u))
-    return ufl.diff(element.potential(F), F)
+    return ufl.diff(element.smooth_potential(F), F)
 
 
 def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
@@ -47,7 +47,7 @@ def cauchy_stress(u: Tensor, element: Element) -> Tensor:
     """
     material, F = element.material, deformation_gradient(u)
     F = ufl.variable(F if material.plane_stress else in_space(F))
-    P = ufl.diff(element.potential(F), F)
+    P = ufl.diff(element.smooth_potential(F), F)
     sigma = P if material.linear else P * F.T / ufl.det(F)
     if sigma.ufl_shape == (3, 3):
         return sigma
