@@ -217,16 +217,17 @@ def test_resumed_and_distributed_runs(tmp_path):
     (tmp_path / "case.yaml").write_text(CASE)
 
     def run(name, *words, processes=1):
-        ended = fsci(*words, "-o", tmp_path / name, processes=processes)
+        ended = fsci(*words, processes=processes)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         return read_history(tmp_path / name / "history.csv")
 
-    whole = run("whole", "run", tmp_path)
+    whole = run("whole", "run", tmp_path, "-o", tmp_path / "whole")
     assert whole["tip.y"][-1] < 1.1 * whole["tip.y"][1]
-    run("half", "run", tmp_path, "--set", "time.end=0.3")
-    half = run("half", "run", tmp_path, "--resume")
-    run("two", "run", tmp_path, "--set", "time.end=0.3", processes=2)
-    two = run("two", "run", tmp_path, "--resume")
+    short = ("--set", "time.end=0.3")
+    run("half", "run", tmp_path, "-o", tmp_path / "half", *short)
+    half = run("half", "resume", tmp_path / "half", "--set", "time.end=0.6")
+    run("two", "run", tmp_path, "-o", tmp_path / "two", *short, processes=2)
+    two = run("two", "resume", tmp_path / "two", "--set", "time.end=0.6")
     for name in ("tip.x", "tip.y", "left.x", "left.y", "energy.internal"):
         assert np.array_equal(half[name], whole[name]), name
         assert two[name] == pytest.approx(whole[name], rel=1e-8, abs=1e-8), name
