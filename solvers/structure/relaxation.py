@@ -155,7 +155,12 @@ class Relaxing:
         q, r = ufl.TestFunction(space), ufl.TrialFunction(space)
         entry = fem.function(fem.quadrature_space(self._domain, self._degree))
         mass, cells = fem.compile_form(q * r * dx), np.sort(fem.cell_blocks(space)[: len(self._blocks)], axis=1)
-        return entry, fem.compile_form(entry * q * dx), cells, np.linalg.inv(by_cells(fem.create_matrix(mass), mass, cells))
+        return (
+            entry,
+            fem.compile_form(entry * q * dx),
+            cells,
+            np.linalg.inv(by_cells(fem.create_matrix(mass), mass, cells)),
+        )
 
     def prepare_output(self) -> None:
         self._element.prepare_output()

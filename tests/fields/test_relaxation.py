@@ -130,7 +130,9 @@ def test_spin_changes_nothing(element):
     def turned(t):
         return Rotation.from_rotvec([3.0 * max(t - h, 0.0), -2.0 * max(t - h, 0.0), 0.0]).as_matrix()
 
-    spinning = held(RUBBER, lambda t: turned(t) @ (np.eye(3) + min(t / h, 1.0) * (stretch - np.eye(3))), element=element)
+    spinning = held(
+        RUBBER, lambda t: turned(t) @ (np.eye(3) + min(t / h, 1.0) * (stretch - np.eye(3))), element=element
+    )
     still = held(RUBBER, lambda t: np.eye(3) + min(t / h, 1.0) * (stretch - np.eye(3)), element=element)
     lost = []
     for n in range(6):
