@@ -275,6 +275,6 @@ MATERIAL_EXAMPLES = {
         "material: {law: holzapfel_gasser_ogden, mu: 7.6e3, k1: 9.966e5, k2: 524.6, dispersion: 0.226,\n"
         "           fibres: [[1, 0, 0.85], [1, 0, -0.85]], bulk: 1e6, density: 1100}"
     ),
-    "Relaxing": "material: {law: neo_hooke, E: 1e6, nu: 0.49, density: 1100, viscous: [{share: 0.4, time: 0.02}]}",
+    "Relaxing": "viscous: [{share: 0.4, time: 0.02}, {share: 0.1, time: 3}]",
     "OwnLaw": "material: {law: gent.py:Gent, parameters: {mu: 4e5, limit: 30, bulk: 1e8}, density: 1100}",
 }

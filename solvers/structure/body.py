@@ -17,6 +17,7 @@ from solvers.api import Array
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh
 from solvers.structure import forms
+from solvers.structure.active import Active, ActiveStress
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
 from solvers.structure.elements import Displacement, Formulation, Mixed
@@ -49,6 +50,7 @@ class Body:
         body_force: Sequence[Value] | None = None,  # [N/m^3]
         tractions: Sequence[Traction] = (),
         pressures: Sequence[Pressure] = (),
+        active: Sequence[Active] = (),
         point_forces: Sequence[PointForce] = (),
         line_forces: Sequence[LineForce] = (),
         initial_displacement: Sequence[Value] | None = None,  # [m]
@@ -86,7 +88,9 @@ class Body:
             self._dead.add_points(point)
         self.dead_load = np.zeros(self.size)
         self._loads_at: float | None = None  #: time [s] of the loads
-        self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
+        self.active = [ActiveStress(domain, self.space, one, self.stiffness_degree) for one in active]
+        #: loads that depend on the displacement
+        self.pressures = [*(FollowerPressure(domain, self.space, pressure) for pressure in pressures), *self.active]
         self._spring_matrix = Springs(self) if springs else None
         self._averages: tuple[Any, Any] | None = None  #: space of nodal averages and expression of the stress
 
@@ -251,7 +255,7 @@ class Body:
         """Nodal averages of the Cauchy stress [Pa] at owned nodes, 3x3 by rows, shape (owned, 9) (collective)."""
         if self._averages is None:  # compiled for the first picture or file: a step of a small body takes less time
             at = fem.reference_nodes(self.domain)
-            expression = fem.compile_expression(forms.cauchy_stress(self.u, self.element), at)
+            expression = fem.compile_expression(forms.cauchy_stress(self.u, self.element, self.active), at)
             self._averages = fem.scalar_space(self.domain), expression
         self.element.prepare_output()
         return fem.average_at_nodes(self.domain, *self._averages, components=9)[: self.owned]

@@ -71,7 +71,7 @@ def on_surface(structure: Structure, body: Body, quantity: str, surface: str) ->
             return _components([fem.assemble_scalar(form, structure.comm) / size for form in mean])
 
         return displacement
-    P = forms.first_piola_kirchhoff(body.u, body.element)
+    P = forms.first_piola_kirchhoff(body.u, body.element, body.active)
     traction = P * ufl.FacetNormal(body.domain.mesh)
     resultant = [fem.compile_form(traction[i] * ds) for i in range(body.dim)]
 
