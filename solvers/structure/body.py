@@ -90,7 +90,10 @@ class Body:
         self._loads_at: float | None = None  #: time [s] of the loads
         self.active = [ActiveStress(domain, self.space, one, self.stiffness_degree) for one in active]
         #: loads that depend on the displacement
-        self.pressures = [*(FollowerPressure(domain, self.space, pressure) for pressure in pressures), *self.active]
+        self.pressures: list[FollowerPressure | ActiveStress] = [
+            *(FollowerPressure(domain, self.space, pressure) for pressure in pressures),
+            *self.active,
+        ]
         self._spring_matrix = Springs(self) if springs else None
         self._averages: tuple[Any, Any] | None = None  #: space of nodal averages and expression of the stress
 

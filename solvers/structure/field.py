@@ -92,7 +92,7 @@ class Structure:
         """Whether tangents away from contact are symmetric (collective)."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
         damped = self.damping is not None and (self.inertia.moves_mass() or not self.damping.symmetric)
-        return not (damped or any(body.pressures for body in self.bodies))
+        return not (damped or any(len(body.pressures) > len(body.active) for body in self.bodies))
 
     def create_solver(self, *, contact: bool = False) -> PETSc.KSP:
         """The present linear solver, away from contact or in contact; created once (collective)."""

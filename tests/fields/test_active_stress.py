@@ -13,6 +13,7 @@ from solvers.structure.materials import LinearElastic, NeoHooke
 
 BAR = """
 time: {{step: 0.25, end: 1}}
+solver: {{newton: {{residual: 1e-12}}}}
 structure:
   bodies:
     bar:
