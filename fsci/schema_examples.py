@@ -77,6 +77,7 @@ EXAMPLES = {
     "Spring": "springs:\n  - {on: left, stiffness: 1e4, normal: true}",
     "Traction": 'tractions:\n  - {on: right, value: [0, "-1e3*ramp(t, 0, 1)"]}',
     "Pressure": 'pressures:\n  - {on: [inner, start], value: "2e3*t"}',
+    "Active": 'active:\n  - {direction: [1, 0, 0.2], stress: "6e4*ramp(t, 0, 1)"}',
     "LineForce": "line_forces:\n  - {on: edge, value: [0, 0, -10]}",
     "PointForce": "point_forces:\n  - {at: [1, 0.05], value: [0, -10]}",
     "Fluid": FLUID,

@@ -33,6 +33,7 @@ from solvers.structure.materials import (
     PlaneStressLinearElastic,
     PlaneStressStVenantKirchhoff,
 )
+from solvers.structure.relaxation import Branch
 from solvers.structure.supports import SupportError
 from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer
@@ -77,7 +78,8 @@ def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: L
     vectors = {key: getattr(settings, key) for key in VECTORS}
     material = _material(case, name)
     loads = build_loads(settings, locations)
-    return Body(name, mesh, material, element=settings.element, **loads, **vectors, comm=comm)
+    relaxing = [Branch(part.share, part.time) for part in settings.material.viscous]
+    return Body(name, mesh, material, element=settings.element, relaxing=relaxing, **loads, **vectors, comm=comm)
 
 
 def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Locations]]:

@@ -113,6 +113,9 @@ def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:
         yield ("structure", "plane"), "'plane' is for 2D, but the mesh is 3D"
     elif structure.plane == "stress":
         for name, body in structure.bodies.items():
+            if body.material.viscous:
+                keys = ("structure", "bodies", name, "material", "viscous")
+                yield keys, "'viscous' is not available in plane stress, where the thickness would relax, too"
             if body.material.law != "st_venant_kirchhoff" and body.kinematics == "finite":
                 keys = ("structure", "bodies", name, "material", "law")
                 yield keys, f"plane stress needs the law 'st_venant_kirchhoff', not '{body.material.law}'"
@@ -153,7 +156,7 @@ def vectors_of(body: BodySection) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
     """Path from a body and value of all vectors of its material, supports, springs and loads."""
     for i, direction in enumerate(getattr(body.material, "fibres", ())):
         yield ("material", "fibres", i), direction
-    for kind in ("supports", "springs", "tractions", "line_forces", "point_forces"):
+    for kind in ("supports", "springs", "tractions", "active", "line_forces", "point_forces"):
         for i, item in enumerate(getattr(body, kind)):
             for name in ("at", "displacement", "direction", "value"):
                 vector = getattr(item, name, None)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from fsci.case.section import Section, setting
+from pydantic import model_validator
+
+from fsci.case.section import Section, fault, setting
 from fsci.case.supports import AT, Located
-from fsci.case.values import Formula, NumberVector, Surfaces, Vector
+from fsci.case.values import Formula, NumberVector, SpaceVector, Surfaces, Vector
 
 
 class TractionSection(Section):
@@ -19,6 +21,22 @@ class PressureSection(Section):
 
     on: Surfaces = setting(..., "name of a surface, or list of names")
     value: Formula = setting(..., "pressure; a positive one pushes against the surface", unit="Pa")
+
+
+class ActiveSection(Section):
+    """A stress T a a along fibres with the unit vector a of the undeformed body, as of muscles.
+
+    It is the second Piola-Kirchhoff stress: the force per reference area along a fibre is T times its stretch.
+    """
+
+    direction: SpaceVector = setting(..., "direction of the fibres in the undeformed body, of any length")
+    stress: Formula = setting(..., "T; positive: the fibres pull", unit="Pa")
+
+    @model_validator(mode="after")
+    def _not_zero(self) -> ActiveSection:
+        if all(entry.constant == 0.0 for entry in self.direction):
+            raise fault("must not be zero", "direction")
+        return self
 
 
 class LineForceSection(Section):

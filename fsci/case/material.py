@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
@@ -14,6 +14,7 @@ from fsci.case.values import (
     Name,
     NotNegativeFormula,
     PoissonFormula,
+    Positive,
     PositiveFormula,
     SpaceFormula,
     SpaceVector,
@@ -39,6 +40,24 @@ def _or_zero(setting: Expression | None) -> Value:
     return 0.0 if setting is None else value_of(setting)
 
 
+class RelaxingSection(Section):
+    """A part of the stress that relaxes: of the distortional stress at once, `share` decays with exp(-t/time)."""
+
+    share: Positive = setting(..., "share of the stress at once, as g_i of a Prony series", unit="1")
+    time: Positive = setting(..., "time in which it falls to 37 %", unit="s")
+
+
+def _some_remains(parts: tuple[RelaxingSection, ...]) -> tuple[RelaxingSection, ...]:
+    total = sum(part.share for part in parts)
+    if total >= 1:
+        raise fault(f"the sum of all 'share' in 'viscous' must be less than 1, not {total:g}")
+    return parts
+
+
+Viscous = Annotated[tuple[RelaxingSection, ...], AfterValidator(_some_remains)]
+VISCOUS = "stresses that relax (Prony series); the constants of the law are those after a long time; default: none"
+
+
 class ElasticSection(Section):
     """A hyperelastic law with two constants: exactly E and nu, or lambda and mu, or mu and nu.
 
@@ -53,6 +72,7 @@ class ElasticSection(Section):
     lmbda: SpaceFormula | None = setting(None, "first Lame constant", unit="Pa", name="lambda")
     mu: PositiveFormula | None = setting(None, "second Lame constant, the shear modulus", unit="Pa")
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+    viscous: Viscous = setting(tuple, VISCOUS)
 
     @model_validator(mode="after")
     def _two_constants(self) -> ElasticSection:
@@ -95,6 +115,7 @@ class MooneyRivlinSection(Section):
     c01: SpaceFormula = setting(..., "factor of the second invariant", unit="Pa")
     bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+    viscous: Viscous = setting(tuple, VISCOUS)
 
     @model_validator(mode="after")
     def _stiff(self) -> MooneyRivlinSection:
@@ -128,6 +149,7 @@ class YeohSection(Section):
     c30: SpaceFormula | None = setting(None, "factor of (I - 3)^3; default: 0", unit="Pa")
     bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+    viscous: Viscous = setting(tuple, VISCOUS)
 
     @property
     def lame(self) -> tuple[Value, Value]:
@@ -158,6 +180,7 @@ class HolzapfelGasserOgdenSection(Section):
     )
     bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+    viscous: Viscous = setting(tuple, VISCOUS)
 
     @model_validator(mode="after")
     def _directions(self) -> HolzapfelGasserOgdenSection:
@@ -204,6 +227,7 @@ class OwnLawSection(Section):
     ] = setting(..., "file, relative to the case file, and name of the function")
     parameters: dict[Name, SpaceFormula] = setting(dict, "values of the function's parameters")
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+    viscous: Viscous = setting(tuple, VISCOUS)
 
     @property
     def file(self) -> str:
@@ -251,5 +275,6 @@ MATERIAL_EXAMPLES = {
         "material: {law: holzapfel_gasser_ogden, mu: 7.6e3, k1: 9.966e5, k2: 524.6, dispersion: 0.226,\n"
         "           fibres: [[1, 0, 0.85], [1, 0, -0.85]], bulk: 1e6, density: 1100}"
     ),
+    "Relaxing": "viscous: [{share: 0.4, time: 0.02}, {share: 0.1, time: 3}]",
     "OwnLaw": "material: {law: gent.py:Gent, parameters: {mu: 4e5, limit: 30, bulk: 1e8}, density: 1100}",
 }

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
-from fsci.case.loads import LineForceSection, PointForceSection, PressureSection, TractionSection
+from fsci.case.loads import ActiveSection, LineForceSection, PointForceSection, PressureSection, TractionSection
 from fsci.case.material import Material
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
@@ -110,6 +110,7 @@ class BodySection(Section):
     body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")
     tractions: tuple[TractionSection, ...] = setting(tuple, "dead loads on surfaces")
     pressures: tuple[PressureSection, ...] = setting(tuple, "follower loads on surfaces")
+    active: tuple[ActiveSection, ...] = setting(tuple, "stresses along fibres, as of muscles")
     line_forces: tuple[LineForceSection, ...] = setting(tuple, "dead loads along lines, 3D only")
     point_forces: tuple[PointForceSection, ...] = setting(tuple, "dead loads at points")
     slip_length: NotNegative = setting(

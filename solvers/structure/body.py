@@ -17,11 +17,13 @@ from solvers.api import Array
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh
 from solvers.structure import forms
+from solvers.structure.active import Active, ActiveStress
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
 from solvers.structure.elements import Displacement, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
 from solvers.structure.materials import Material, parameters
+from solvers.structure.relaxation import Branch, Relaxing
 from solvers.structure.springs import Spring, Springs
 from solvers.structure.supports import Roller, Support, Symmetry
 from solvers.values import Value, evaluate_components
@@ -41,12 +43,14 @@ class Body:
         material: Material,
         *,
         element: Formulation = "displacement",
+        relaxing: Sequence[Branch] = (),
         supports: Sequence[Support | Symmetry | Roller] = (),
         springs: Sequence[Spring] = (),
         gravity: Sequence[Value] | None = None,  # [m/s^2]
         body_force: Sequence[Value] | None = None,  # [N/m^3]
         tractions: Sequence[Traction] = (),
         pressures: Sequence[Pressure] = (),
+        active: Sequence[Active] = (),
         point_forces: Sequence[PointForce] = (),
         line_forces: Sequence[LineForce] = (),
         initial_displacement: Sequence[Value] | None = None,  # [m]
@@ -65,7 +69,7 @@ class Body:
         self.stiffness_degree, self.mass_degree = CELL_TYPES[domain.cell_type].quadrature
         self.density = self._parameter(material.density)
         self.parameters = {k: self._parameter(p) for k, p in parameters(material).items()}
-        self.element = self._element(fem.volume_measure(domain, self.stiffness_degree))
+        self.element = self._element(fem.volume_measure(domain, self.stiffness_degree), relaxing)
         self._energy, self._internal, self._tangent, self._mass = self._compiled()
         self._tangent_assembly = BlockAssembly(self._tangent)
         self._force = fem.function(self.space)
@@ -84,7 +88,12 @@ class Body:
             self._dead.add_points(point)
         self.dead_load = np.zeros(self.size)
         self._loads_at: float | None = None  #: time [s] of the loads
-        self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
+        self.active = [ActiveStress(domain, self.space, one, self.stiffness_degree) for one in active]
+        #: loads that depend on the displacement
+        self.pressures: list[FollowerPressure | ActiveStress] = [
+            *(FollowerPressure(domain, self.space, pressure) for pressure in pressures),
+            *self.active,
+        ]
         self._spring_matrix = Springs(self) if springs else None
         self._averages: tuple[Any, Any] | None = None  #: space of nodal averages and expression of the stress
 
@@ -115,10 +124,13 @@ class Body:
         cellwise.x.array[:] = value(fem.cell_midpoints(self.domain), 0.0)
         return cellwise
 
-    def _element(self, dx: ufl.Measure) -> Element:
+    def _element(self, dx: ufl.Measure, relaxing: Sequence[Branch]) -> Element:
+        element: Element = Displacement(self.material, self.parameters)
         if self.formulation == "mixed":
-            return Mixed(self.domain, self.u, self.material, self.parameters, dx)
-        return Displacement(self.material, self.parameters)
+            element = Mixed(self.domain, self.u, self.material, self.parameters, dx)
+        if not relaxing:
+            return element
+        return Relaxing(element, self.domain, self.u, self.parameters, self.stiffness_degree, relaxing)
 
     def _compiled(self) -> Sequence[Any]:
         """Energy, internal force, its tangent and the mass."""
@@ -243,11 +255,12 @@ class Body:
         return low, self.name, self.domain.comm.bcast(place, root=rank) if not low > 0.0 else ()
 
     def stress(self) -> Array:
-        """Nodal averages of the Cauchy stress [Pa] at owned nodes, 3x3 by rows, shape (owned, 9)."""
+        """Nodal averages of the Cauchy stress [Pa] at owned nodes, 3x3 by rows, shape (owned, 9) (collective)."""
         if self._averages is None:  # compiled for the first picture or file: a step of a small body takes less time
             at = fem.reference_nodes(self.domain)
-            expression = fem.compile_expression(forms.cauchy_stress(self.u, self.element), at)
+            expression = fem.compile_expression(forms.cauchy_stress(self.u, self.element, self.active), at)
             self._averages = fem.scalar_space(self.domain), expression
+        self.element.prepare_output()
         return fem.average_at_nodes(self.domain, *self._averages, components=9)[: self.owned]
 
     def internal_energy(self) -> float:

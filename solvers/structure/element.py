@@ -6,6 +6,7 @@ from typing import Protocol
 
 from petsc4py import PETSc
 
+from solvers.api import State
 from solvers.structure.materials import Material, Tensor
 
 
@@ -26,8 +27,16 @@ class Element(Protocol):
         """The density [J/m^3] whose second derivative in F is the tangent without the term of `complete_tangent`."""
         ...
 
-    def begin_step(self) -> None:
-        """Discard the last iterate of the step before."""
+    def smooth_potential(self, F: Tensor) -> Tensor:
+        """`potential` at any point of cells and facets, after `prepare_output`."""
+        ...
+
+    def begin_step(self, dt: float) -> None:
+        """Begin a step of length dt [s] from the present displacement, without the last iterate of that before."""
+        ...
+
+    def end_step(self) -> float:
+        """Accept the step to the present displacement; returns the work [J] on stresses that relax (collective)."""
         ...
 
     def update(self) -> None:
@@ -40,4 +49,16 @@ class Element(Protocol):
 
     def complete_tangent(self, matrix: PETSc.Mat) -> None:
         """Add the derivatives of eliminated fields to the assembled tangent [N/m]."""
+        ...
+
+    def prepare_output(self) -> None:
+        """Update what `smooth_potential` needs to the present step (collective)."""
+        ...
+
+    def save(self) -> State:
+        """The state that the next step starts from, besides the displacement; empty without any."""
+        ...
+
+    def restore(self, state: State) -> None:
+        """Set what `save` returned."""
         ...

@@ -10,10 +10,11 @@ from typing import Any, Literal
 
 import numpy as np
 import ufl
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import fem
-from solvers.api import Array
+from solvers.api import Array, State
 from solvers.structure import forms
 from solvers.structure.materials import Material, Tensor
 
@@ -29,10 +30,13 @@ class Displacement:
     def energy(self, F: Tensor) -> Tensor:
         return self.material.energy(F, **self.parameters)
 
-    potential = tangent_potential = energy
+    potential = tangent_potential = smooth_potential = energy
 
-    def begin_step(self) -> None:
+    def begin_step(self, dt: float) -> None:
         pass
+
+    def end_step(self) -> float:
+        return 0.0
 
     def update(self) -> None:
         pass
@@ -41,6 +45,15 @@ class Displacement:
         pass
 
     def complete_tangent(self, matrix: PETSc.Mat) -> None:
+        pass
+
+    def prepare_output(self) -> None:
+        pass
+
+    def save(self) -> State:
+        return {}
+
+    def restore(self, state: State) -> None:
         pass
 
 
@@ -80,7 +93,7 @@ class Mixed:
         #: owned unknowns of q in each cell, as the columns of a matrix are ordered
         self._cells = np.sort(fem.cell_blocks(space)[: fem.owned_cells(domain)], axis=1)
         mass = fem.compile_form(q * r * dx)
-        self._inverse_mass = np.linalg.inv(self._blocks(fem.create_matrix(mass), mass))
+        self._inverse_mass = np.linalg.inv(by_cells(fem.create_matrix(mass), mass, self._cells))
         self._C, self._B = fem.create_matrix(self._modulus), fem.create_matrix(self._change)
         self._CB: PETSc.Mat | None = None
         self._BCB: PETSc.Mat | None = None
@@ -93,12 +106,17 @@ class Mixed:
     def potential(self, F: Tensor) -> Tensor:
         return self.material.distortional(F, **self.parameters) + self._pressure * self.material.volume_ratio(F)
 
+    smooth_potential = potential
+
     def tangent_potential(self, F: Tensor) -> Tensor:
         distortion = self.material.distortional(F, **self.parameters)
         return distortion + self._tangent_pressure * self.material.volume_ratio(F)
 
-    def begin_step(self) -> None:
+    def begin_step(self, dt: float) -> None:
         self._last = None
+
+    def end_step(self) -> float:
+        return 0.0
 
     def update(self) -> None:
         for function, right in ((self._ratio, self._ratio_right), (self._pressure, self._pressure_right)):
@@ -106,11 +124,6 @@ class Mixed:
             fem.assemble_vector(right, function.x.array)
             function.x.array[self._cells] = np.einsum("cij,cj->ci", self._inverse_mass, function.x.array[self._cells])
             function.x.scatter_forward()
-
-    def _blocks(self, matrix: PETSc.Mat, form: Any) -> Array:
-        """A form of q and r by cells, shape (cells, n, n); it is assembled into `matrix`."""
-        _assemble(matrix, form)
-        return matrix.getValuesCSR()[2].reshape(-1, self._cells.shape[1])[self._cells]
 
     def linearise(self) -> None:
         present = self._pressure.x.array.copy()
@@ -127,7 +140,7 @@ class Mixed:
 
     def _multiply(self) -> None:
         """M^-1 C M^-1 B and B^T M^-1 C M^-1 B."""
-        C = self._inverse_mass @ self._blocks(self._C, self._modulus) @ self._inverse_mass
+        C = self._inverse_mass @ by_cells(self._C, self._modulus, self._cells) @ self._inverse_mass
         rows = np.empty((self._cells.size, self._cells.shape[1]))
         rows[self._cells] = C
         indptr, indices, _ = self._C.getValuesCSR()
@@ -140,6 +153,24 @@ class Mixed:
     def complete_tangent(self, matrix: PETSc.Mat) -> None:
         """The sparsity of B^T C B is that of the tangent."""
         matrix.axpy(1.0, self._BCB, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+
+    def prepare_output(self) -> None:
+        pass
+
+    def save(self) -> State:
+        return {}
+
+    def restore(self, state: State) -> None:
+        pass
+
+
+def by_cells(matrix: PETSc.Mat, form: Any, cells: NDArray[np.int32]) -> Array:
+    """A form of discontinuous functions by cells, shape (cells, n, n); it is assembled into `matrix`.
+
+    cells: owned unknowns of each cell in ascending order, shape (cells, n).
+    """
+    _assemble(matrix, form)
+    return matrix.getValuesCSR()[2].reshape(-1, cells.shape[1])[cells]  # type: ignore[no-any-return]
 
 
 def _assemble(matrix: PETSc.Mat, form: Any) -> None:

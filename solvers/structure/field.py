@@ -92,7 +92,7 @@ class Structure:
         """Whether tangents away from contact are symmetric (collective)."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
         damped = self.damping is not None and (self.inertia.moves_mass() or not self.damping.symmetric)
-        return not (damped or any(body.pressures for body in self.bodies))
+        return not (damped or any(len(body.pressures) > len(body.active) for body in self.bodies))
 
     def create_solver(self, *, contact: bool = False) -> PETSc.KSP:
         """The present linear solver, away from contact or in contact; created once (collective)."""
@@ -203,7 +203,7 @@ class Structure:
         self.old = self.now.copy()
         self.extrapolation = self.time.extrapolation(self, t, dt)
         for body in self.bodies:
-            body.element.begin_step()
+            body.element.begin_step(dt)
         self.current = Step(t + dt, dt)
         self.inertia.begin_step(self.old.v, self.old.a, self.old.rigid)
         # not part of the saved state: a resumed run must start alike
@@ -269,7 +269,7 @@ class Structure:
         if isinstance(self.time, Statics) and self.current.dt > 0.0:
             self._limit_point.accept(self.current.t, self.norm(du) / self.current.dt)
         sums = self.comm.allreduce(np.array(parts)).tolist()
-        works, damping = [*sums[:3], float(pushed[0])], sums[3]
+        works, damping = [*sums[:3], float(pushed[0])], sums[3] + sum(body.element.end_step() for body in self.bodies)
         doubt = sum(map(abs, (*sums[4:], float(pushed[1]))))
         self.energy.add_step(works, damping, *self._energies(), doubt)
 

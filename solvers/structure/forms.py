@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import ufl
 
+from solvers.structure.active import ActiveStress
 from solvers.structure.element import Element
 from solvers.structure.materials import Tensor, in_space
 
@@ -29,10 +32,14 @@ def tangent(u: Tensor, element: Element, v: Tensor, du: Tensor, dx: ufl.Measure)
     return ufl.derivative(ufl.derivative(energy, u, v), u, du)
 
 
-def first_piola_kirchhoff(u: Tensor, element: Element) -> Tensor:
-    """P = dW/dF [Pa]."""
+def first_piola_kirchhoff(u: Tensor, element: Element, active: Sequence[ActiveStress] = ()) -> Tensor:
+    """P = dW/dF [Pa], at any point after `element.prepare_output()`."""
     F = ufl.variable(deformation_gradient(u))
-    return ufl.diff(element.potential(F), F)
+    return ufl.diff(_smooth(F, element, active), F)
+
+
+def _smooth(F: Tensor, element: Element, active: Sequence[ActiveStress]) -> Tensor:
+    return element.smooth_potential(F) + sum(one.potential(F, linear=element.material.linear) for one in active)
 
 
 def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
@@ -40,14 +47,14 @@ def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
     return rho * ufl.inner(a, v) * dx
 
 
-def cauchy_stress(u: Tensor, element: Element) -> Tensor:
+def cauchy_stress(u: Tensor, element: Element, active: Sequence[ActiveStress] = ()) -> Tensor:
     """sigma = P F^T / J [Pa], shape (3, 3) also in 2D: sigma_33 is zero in plane stress, else that of F_33 = 1.
 
     For small displacements sigma = P.
     """
     material, F = element.material, deformation_gradient(u)
     F = ufl.variable(F if material.plane_stress else in_space(F))
-    P = ufl.diff(element.potential(F), F)
+    P = ufl.diff(_smooth(F, element, active), F)
     sigma = P if material.linear else P * F.T / ufl.det(F)
     if sigma.ufl_shape == (3, 3):
         return sigma

@@ -71,10 +71,15 @@ def on_surface(structure: Structure, body: Body, quantity: str, surface: str) ->
             return _components([fem.assemble_scalar(form, structure.comm) / size for form in mean])
 
         return displacement
-    P = forms.first_piola_kirchhoff(body.u, body.element)
+    P = forms.first_piola_kirchhoff(body.u, body.element, body.active)
     traction = P * ufl.FacetNormal(body.domain.mesh)
     resultant = [fem.compile_form(traction[i] * ds) for i in range(body.dim)]
-    return lambda: _components([fem.assemble_scalar(form, structure.comm) for form in resultant])
+
+    def force() -> dict[str, float]:
+        body.element.prepare_output()
+        return _components([fem.assemble_scalar(form, structure.comm) for form in resultant])
+
+    return force
 
 
 def _reaction(structure: Structure, body: Body, surface: str) -> Probe:

@@ -30,6 +30,8 @@ def saved_state(structure: SavedStructure) -> State:
     state["last_length"] = structure.last_length
     state["energy"] = structure.energy.save()
     state["linear_solver"] = structure.solver.position
+    if relaxing := {body.name: kept for body in structure.bodies if (kept := body.element.save())}:
+        state["relaxing"] = relaxing
     if structure.constraint is not None:
         state["contact"] = structure.constraint.save()
     return state
@@ -41,6 +43,7 @@ def restore_state(structure: SavedStructure, state: State) -> None:
         array[:] = from_bodies(structure, state[name])
     for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
         body.set_displacement(u)
+        body.element.restore(state.get("relaxing", {}).get(body.name, {}))
     if structure.constraint is not None:
         structure.constraint.restore(state["contact"])
         structure.forget_mass()

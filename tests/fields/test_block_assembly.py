@@ -70,7 +70,7 @@ def test_what_else_is_in_a_tangent(more):
     found = []
     for _ in range(2):
         body.set_displacement(0.01 * np.sin(np.arange(body.size)))
-        body.element.begin_step()
+        body.element.begin_step(1.0)
         body.assemble_tangent(matrix, 0.0)
         found.append(matrix.getValuesCSR()[2])
     assert np.array_equal(*found)
