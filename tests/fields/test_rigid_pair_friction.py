@@ -129,15 +129,13 @@ SHARED = "'floor' is also the name of a closed patch, which the body may touch; 
 def test_a_free_body_has_not_the_name_of_a_wall(tmp_path):
     """Friction by pair could not tell them apart; an open patch and a body that nothing touches may share a name."""
     text = (
-        WALLS.replace("    one: {", "    floor: {")
-        .replace("body: one", "body: floor")
-        .replace("[floor, one]", "[floor, two]")
+        WALLS.replace("  one: {", "  floor: {").replace("body: one", "body: floor").replace("floor, one", "floor, two")
     )
     with pytest.raises(CaseError) as error:
         load_case(written(tmp_path, text))
     (problem,) = error.value.problems
     assert problem.message == SHARED
-    assert (problem.place.line, problem.place.column) == (10, 5)
+    assert (problem.place.line, problem.place.column) == (10, 12)
     load_case(written(tmp_path, WALLS.replace("    two: {", "    top: {").replace("body: two", "body: top")))
     contact = WALLS[WALLS.index("contact: ") : WALLS.index("probes: ")]
     off = WALLS.replace("    two: {", "    floor: {").replace("body: two", "body: floor")
