@@ -14,7 +14,7 @@ from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import RowTransformation, TakenRows
 from solvers.algebra.sparse import Sparse, block_diagonal
 from solvers.algebra.vertices import VertexJacobian
-from solvers.api import Array, FailureKind, Indices, State, Step, StepFailed, StepInfo
+from solvers.api import Array, Indices, State, Step, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance, converge
 from solvers.rigid import line_springs, motion, surface
@@ -24,15 +24,13 @@ from solvers.rigid.coulomb import solver
 from solvers.rigid.line_springs import LineSpring
 from solvers.rigid.motion import RigidInstant
 from solvers.rigid.near import Moment
+from solvers.rigid.predicted import leave_others
 from solvers.rigid.rotation import vector_rate
 from solvers.rigid.supported import supported
 from solvers.timing import Timer
 
 #: Unknowns of a body among `COMPONENTS`, by dimension of space.
 UNKNOWNS = {2: np.array([0, 1, 5]), 3: np.arange(6)}
-
-#: Angle [rad] of one step from which rotation vectors are ambiguous.
-HALF_TURN = np.pi
 
 
 class RigidBodies:
@@ -131,11 +129,14 @@ class RigidBodies:
         self.set_increments(self._held_u)
 
     def predict(self, t: float) -> None:
-        """Predictor: free components keep their velocity."""
+        """Predictor: free components keep their velocity, but bodies do not enter others."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
-        self._last = u - self._u
+        before = self._u
         self.set_increments(u)
+        if self.contact is not None:
+            leave_others(self.contact, self._by_component(u), self._measure, self._system, self._add)
+        self._last = self._u - before
 
     def increments(self) -> Array:
         """Increments in the present step: displacement [m] and rotation vector in space [rad], shape (bodies, 6)."""
@@ -158,12 +159,7 @@ class RigidBodies:
 
     def check(self, info: StepInfo) -> None:
         """Raise StepFailed for a body that rotates by half a turn or more in a step."""
-        for body, u in zip(self.bodies, self._u, strict=True):
-            if not np.linalg.norm(u[3:]) < HALF_TURN:
-                reason = f"body '{body.name}' turned by more than half a turn: take a smaller time step"
-                raise StepFailed(
-                    self.name, FailureKind.MOTION, reason, iteration=info.iterations, history=info.residuals
-                )
+        motion.require_short_turns(self.name, self.bodies, self._u, info)
 
     def end_step(self) -> None:
         """Accept the step; with contact, velocities and rates of momentum are those after the impact."""
@@ -289,11 +285,16 @@ class RigidBodies:
         self.balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
             return self._norms(self.balance)
-        moment = Moment(self.bodies, self.now, self.old, self.current.t, self.current.dt)
-        self.contact.measure(moment, self.components, self._free)
+        self._measure()
         with supported():
             self.contact.press(self._system(), -self.balance)
         return self._norms(self.balance - self.contact.force)
+
+    def _measure(self) -> None:
+        """Set the gaps of the iterate."""
+        assert self.contact is not None
+        moment = Moment(self.bodies, self.now, self.old, self.current.t, self.current.dt)
+        self.contact.measure(moment, self.components, self._free)
 
     def _norms(self, rows: Array) -> Array:
         """Norm [N] of forces and moments of each body, shape (bodies,)."""
@@ -426,9 +427,8 @@ class RigidBodies:
         if self._noise is None:
             self.linearise()
         assert self._noise is not None
-        noise = self._from_owner(self._noise)
         missed = self.balance if self.contact is None else self.balance - self.contact.force
-        return (np.abs(missed) <= noise).reshape(len(self.bodies), -1).all(axis=1)
+        return (np.abs(missed) <= self._from_owner(self._noise)).reshape(len(self.bodies), -1).all(axis=1)
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the centre of the body with the largest residual."""
