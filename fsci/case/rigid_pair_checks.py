@@ -30,7 +30,10 @@ def rigid_pair_mistakes(case: Case, contact: ContactSection) -> Iterator[Mistake
                 hint = did_you_mean(body, known)
                 yield (*keys, "bodies", i), f"there is no rigid body, obstacle or closed patch '{body}'{hint}"
             elif body not in free and body in rigid and body in walls:
-                yield (*keys, "bodies", i), f"'{body}' is a rigid body and a closed patch: give one of them another name"
+                yield (
+                    (*keys, "bodies", i),
+                    f"'{body}' is a rigid body and a closed patch: give one of them another name",
+                )
         both = frozenset(pair.bodies)
         if len(both) == 1:
             yield (*keys, "bodies"), "give two different names: a rigid body does not touch itself"

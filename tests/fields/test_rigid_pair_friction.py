@@ -147,7 +147,7 @@ def test_a_pair_names_a_given_body_and_a_wall_at_once(tmp_path):
     with pytest.raises(CaseError) as error:
         load_case(written(tmp_path, WALLS.replace("    one: {", fixed)))
     (problem,) = error.value.problems
-    assert problem.message == "'floor' is a rigid body and a closed patch: give one of them another name"
+    assert problem.message == "'floor' is a rigid body and a closed patch: give one another name"
 
 
 def test_without_free_bodies(tmp_path):
