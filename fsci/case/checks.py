@@ -78,7 +78,8 @@ def _loose(case: Case) -> Iterator[Mistake]:
         if case.fluid is not None:
             yield (
                 whole,
-                "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+                "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'; outside"
+                " of the box it is dry",
             )
         elif case.structure is not None and case.structure.dynamics is None:
             for setting in ("initial_velocity", "initial_angular_velocity"):
