@@ -110,7 +110,7 @@ class RigidBodies:
     def step(self, t: float, dt: float) -> StepInfo:
         """One step from t to t + dt without a flow. Raises StepFailed."""
         self.begin_step(t, dt)
-        self.predict(t + dt)
+        self.extrapolate()
         info = self.solve()
         self.end_step()
         return info
@@ -128,15 +128,19 @@ class RigidBodies:
             u[body.held_components] = prescribed
         self.set_increments(self._held_u)
 
-    def predict(self, t: float) -> None:
-        """Predictor: free components keep their velocity, but bodies do not enter others."""
+    def extrapolate(self) -> None:
+        """Predictor: free components keep their velocity."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
-        before = self._u
+        self._last = u - self._u
         self.set_increments(u)
+
+    def predict(self, t: float) -> None:
+        """The same beside a flow: bodies do not enter others. Alone, Newton's method is as quick to find this."""
+        self.extrapolate()
         if self.contact is not None:
-            leave_others(self.contact, self._by_component(u), self._measure, self._system, self._add)
-        self._last = self._u - before
+            leave_others(self.contact, self._by_component(self._u), self._measure, self._system, self._add)
+            self._last = self._u - self._held_u
 
     def increments(self) -> Array:
         """Increments in the present step: displacement [m] and rotation vector in space [rad], shape (bodies, 6)."""
@@ -309,8 +313,7 @@ class RigidBodies:
         rates, loads = np.array([now.p for now in self.now]), np.array([now.load for now in self.now])
         before = [motion.momentum(body, old.R, old.v) for body, old in zip(self.bodies, self.old, strict=True)]
         momentum = np.array(before) / self.current.dt
-        all_forces = [self._by_component(some) for some in (rates, loads, momentum, self.on_surface)]
-        all_forces.append(self.pressed)
+        all_forces = [self.pressed, *(self._by_component(some) for some in (rates, loads, momentum, self.on_surface))]
         if self.contact is not None:
             all_forces.append(self.contact.force)
         return np.max([self._norms(rows) for rows in all_forces], axis=0)
@@ -354,9 +357,7 @@ class RigidBodies:
 
     def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
         """One Newton iteration; returns increments relative to those of the step, by body. It keeps no tangent."""
-        right = -self.balance
-        if self.contact is not None:
-            right += self.contact.force
+        right = -self.balance if self.contact is None else self.contact.force - self.balance
         with supported():
             if self.contact is None and not self.springs:
                 blocks = self._without_held(self._blocks())
@@ -432,8 +433,7 @@ class RigidBodies:
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the centre of the body with the largest residual."""
-        norms = np.abs(np.nan_to_num(self.balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1)
-        index = int(np.argmax(norms))
+        index = int(np.abs(np.nan_to_num(self.balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1).argmax())
         return tuple((self.bodies[index].inertia.centre + self.now[index].shift[: self.dim]).tolist())
 
     # ------------------------------------------------------------------------------------- rows of a larger system

@@ -1,4 +1,4 @@
-"""The contact of the predictor of rigid bodies: they do not enter others.
+"""The contact of the predictor of rigid bodies in a flow: they do not enter others.
 
 Bodies that keep their velocity enter what they reach in the step. The facets there are not those that meet, and where
 corners pass each other, Newton's method takes many iterates to find these. Here they are found without the flow: the
