@@ -69,7 +69,7 @@ class Composite:
     def step(self, t: float, dt: float) -> StepInfo:
         """One step from t to t + dt without a flow. Raises StepFailed."""
         self.begin_step(t, dt)
-        self.rigid.predict(t + dt)  # the structure begins with the predictor of its own
+        self.rigid.extrapolate()  # the structure begins with the predictor of its own
         info = self.solve()
         self.end_step()
         return info

@@ -185,6 +185,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from solvers.fluid.flow.probes import Forces
     from solvers.fluid.flow.resolution.measure import measure
     from solvers.fluid.flow.snapshot import snapshots as of_fluid
+    from solvers.fluid.flow.snapshot import surface_forces
     from solvers.structure.snapshot import snapshots as of_structure
 
     rigid = _free_bodies(case, comm, timer)
@@ -206,8 +207,9 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
     def snapshots() -> list[Snapshot]:
         dry = outlines(fluid, coupled.interface.dry_sides)
-        loads = loads_of_flow(coupled.solid, fluid)
-        return of_structure(structure, _contact_fields(structure), loads) + of_fluid(fluid) + dry
+        forces = surface_forces(fluid)
+        loads = loads_of_flow(coupled.solid, fluid, forces)
+        return of_structure(structure, _contact_fields(structure), loads) + of_fluid(fluid, forces) + dry
 
     return Simulation(
         scheme=scheme,

@@ -15,7 +15,7 @@ from fsci.case.free_checks import free_mistakes
 from fsci.case.material import HolzapfelGasserOgdenSection, OwnLawSection, has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
-from fsci.case.rigid_pair_checks import rigid_pair_mistakes
+from fsci.case.rigid_pair_checks import rigid_pair_mistakes, shared_names
 from fsci.case.shapes import ShapeSection
 from fsci.case.structure import NO_MIXED_SIMPLICES, BodySection, StructureSection
 from fsci.case.yaml_text import Keys
@@ -30,6 +30,7 @@ def mistakes(case: Case) -> Iterator[Mistake]:
         yield from _structure(case, case.structure)
     if case.fluid is not None:
         yield from fluid_mistakes(case, case.fluid)
+        yield from shared_names(case)
     if case.contact is not None:
         yield from _contact(case, case.contact)
     yield from _loose(case)
@@ -77,7 +78,8 @@ def _loose(case: Case) -> Iterator[Mistake]:
         if case.fluid is not None:
             yield (
                 whole,
-                "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+                "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'; outside"
+                " of the box it is dry",
             )
         elif case.structure is not None and case.structure.dynamics is None:
             for setting in ("initial_velocity", "initial_angular_velocity"):

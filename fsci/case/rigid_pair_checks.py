@@ -1,4 +1,4 @@
-"""Mistakes in `contact.rigid_pairs`."""
+"""Mistakes in `contact.rigid_pairs`, and names that it could not tell apart."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ def rigid_pair_mistakes(case: Case, contact: ContactSection) -> Iterator[Mistake
     if contact.rigid_pairs and not free:
         yield ("contact", "rigid_pairs"), "'rigid_pairs' is for free rigid bodies, which this case has not"
         return
-    fluid = case.fluid
-    walls = [] if fluid is None else [name for name, patch in fluid.patches.items() if _may_close(patch.kind)]
-    known = dict.fromkeys([*free, *case.rigid_surfaces, *contact.obstacles, *walls])
+    rigid, walls = [*free, *case.rigid_surfaces, *contact.obstacles], _closed_patches(case)
+    known = dict.fromkeys([*rigid, *walls])
     seen: dict[frozenset[str], str] = {}
     for name, pair in contact.rigid_pairs.items():
         keys: Keys = ("contact", "rigid_pairs", name)
@@ -30,6 +29,11 @@ def rigid_pair_mistakes(case: Case, contact: ContactSection) -> Iterator[Mistake
             elif body not in known:
                 hint = did_you_mean(body, known)
                 yield (*keys, "bodies", i), f"there is no rigid body, obstacle or closed patch '{body}'{hint}"
+            elif body not in free and body in rigid and body in walls:
+                yield (
+                    (*keys, "bodies", i),
+                    f"'{body}' is a rigid body and a closed patch: give one of them another name",
+                )
         both = frozenset(pair.bodies)
         if len(both) == 1:
             yield (*keys, "bodies"), "give two different names: a rigid body does not touch itself"
@@ -42,6 +46,22 @@ def rigid_pair_mistakes(case: Case, contact: ContactSection) -> Iterator[Mistake
         seen.setdefault(both, name)
         if pair.friction is not None and pair.friction.bound is not None:
             yield (*keys, "friction", "bound"), "rigid bodies have Coulomb's friction: give 'coefficient'"
+
+
+def shared_names(case: Case) -> Iterator[Mistake]:
+    """Free bodies of the flow with the name of a patch that they may touch."""
+    walls = _closed_patches(case)
+    if case.fluid is None or case.contact_off:
+        return
+    for name in case.fluid.free_bodies:
+        if name in walls:
+            message = f"'{name}' is also the name of a closed patch, which the body may touch; give one another name"
+            yield ("fluid", "bodies", name), message
+
+
+def _closed_patches(case: Case) -> list[str]:
+    patches = {} if case.fluid is None else case.fluid.patches
+    return [name for name, patch in patches.items() if _may_close(patch.kind)]
 
 
 def _may_close(kind: str) -> bool:

@@ -68,6 +68,10 @@ class RigidContact:
         """Nothing is known of the contact forces."""
         self._pressing, self._measured = (np.empty(0, dtype=np.int64), self.near.x[:0]), 0
 
+    def end_prediction(self) -> None:
+        """Facets may change again; the contact forces are a guess."""
+        self._measured = 0
+
     def forget(self) -> None:
         """No contact forces, until `press`."""
         self.z = np.zeros_like(self.z)

@@ -14,7 +14,7 @@ from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import RowTransformation, TakenRows
 from solvers.algebra.sparse import Sparse, block_diagonal
 from solvers.algebra.vertices import VertexJacobian
-from solvers.api import Array, FailureKind, Indices, State, Step, StepFailed, StepInfo
+from solvers.api import Array, Indices, State, Step, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance, converge
 from solvers.rigid import line_springs, motion, surface
@@ -24,15 +24,13 @@ from solvers.rigid.coulomb import solver
 from solvers.rigid.line_springs import LineSpring
 from solvers.rigid.motion import RigidInstant
 from solvers.rigid.near import Moment
+from solvers.rigid.predicted import leave_others
 from solvers.rigid.rotation import vector_rate
 from solvers.rigid.supported import supported
 from solvers.timing import Timer
 
 #: Unknowns of a body among `COMPONENTS`, by dimension of space.
 UNKNOWNS = {2: np.array([0, 1, 5]), 3: np.arange(6)}
-
-#: Angle [rad] of one step from which rotation vectors are ambiguous.
-HALF_TURN = np.pi
 
 
 class RigidBodies:
@@ -112,7 +110,7 @@ class RigidBodies:
     def step(self, t: float, dt: float) -> StepInfo:
         """One step from t to t + dt without a flow. Raises StepFailed."""
         self.begin_step(t, dt)
-        self.predict(t + dt)
+        self.extrapolate()
         info = self.solve()
         self.end_step()
         return info
@@ -130,12 +128,19 @@ class RigidBodies:
             u[body.held_components] = prescribed
         self.set_increments(self._held_u)
 
-    def predict(self, t: float) -> None:
+    def extrapolate(self) -> None:
         """Predictor: free components keep their velocity."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
         self._last = u - self._u
         self.set_increments(u)
+
+    def predict(self, t: float) -> None:
+        """The same beside a flow: bodies do not enter others. Alone, Newton's method is as quick to find this."""
+        self.extrapolate()
+        if self.contact is not None:
+            leave_others(self.contact, self._by_component(self._u), self._measure, self._system, self._add)
+            self._last = self._u - self._held_u
 
     def increments(self) -> Array:
         """Increments in the present step: displacement [m] and rotation vector in space [rad], shape (bodies, 6)."""
@@ -158,12 +163,7 @@ class RigidBodies:
 
     def check(self, info: StepInfo) -> None:
         """Raise StepFailed for a body that rotates by half a turn or more in a step."""
-        for body, u in zip(self.bodies, self._u, strict=True):
-            if not np.linalg.norm(u[3:]) < HALF_TURN:
-                reason = f"body '{body.name}' turned by more than half a turn: take a smaller time step"
-                raise StepFailed(
-                    self.name, FailureKind.MOTION, reason, iteration=info.iterations, history=info.residuals
-                )
+        motion.require_short_turns(self.name, self.bodies, self._u, info)
 
     def end_step(self) -> None:
         """Accept the step; with contact, velocities and rates of momentum are those after the impact."""
@@ -289,11 +289,16 @@ class RigidBodies:
         self.balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
             return self._norms(self.balance)
-        moment = Moment(self.bodies, self.now, self.old, self.current.t, self.current.dt)
-        self.contact.measure(moment, self.components, self._free)
+        self._measure()
         with supported():
             self.contact.press(self._system(), -self.balance)
         return self._norms(self.balance - self.contact.force)
+
+    def _measure(self) -> None:
+        """Set the gaps of the iterate."""
+        assert self.contact is not None
+        moment = Moment(self.bodies, self.now, self.old, self.current.t, self.current.dt)
+        self.contact.measure(moment, self.components, self._free)
 
     def _norms(self, rows: Array) -> Array:
         """Norm [N] of forces and moments of each body, shape (bodies,)."""
@@ -308,8 +313,7 @@ class RigidBodies:
         rates, loads = np.array([now.p for now in self.now]), np.array([now.load for now in self.now])
         before = [motion.momentum(body, old.R, old.v) for body, old in zip(self.bodies, self.old, strict=True)]
         momentum = np.array(before) / self.current.dt
-        all_forces = [self._by_component(some) for some in (rates, loads, momentum, self.on_surface)]
-        all_forces.append(self.pressed)
+        all_forces = [self.pressed, *(self._by_component(some) for some in (rates, loads, momentum, self.on_surface))]
         if self.contact is not None:
             all_forces.append(self.contact.force)
         return np.max([self._norms(rows) for rows in all_forces], axis=0)
@@ -353,9 +357,7 @@ class RigidBodies:
 
     def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
         """One Newton iteration; returns increments relative to those of the step, by body. It keeps no tangent."""
-        right = -self.balance
-        if self.contact is not None:
-            right += self.contact.force
+        right = -self.balance if self.contact is None else self.contact.force - self.balance
         with supported():
             if self.contact is None and not self.springs:
                 blocks = self._without_held(self._blocks())
@@ -426,14 +428,12 @@ class RigidBodies:
         if self._noise is None:
             self.linearise()
         assert self._noise is not None
-        noise = self._from_owner(self._noise)
         missed = self.balance if self.contact is None else self.balance - self.contact.force
-        return (np.abs(missed) <= noise).reshape(len(self.bodies), -1).all(axis=1)
+        return (np.abs(missed) <= self._from_owner(self._noise)).reshape(len(self.bodies), -1).all(axis=1)
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the centre of the body with the largest residual."""
-        norms = np.abs(np.nan_to_num(self.balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1)
-        index = int(np.argmax(norms))
+        index = int(np.abs(np.nan_to_num(self.balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1).argmax())
         return tuple((self.bodies[index].inertia.centre + self.now[index].shift[: self.dim]).tolist())
 
     # ------------------------------------------------------------------------------------- rows of a larger system

@@ -17,15 +17,19 @@ Source: for rho_inf = 1 Simo, Wong, Int. J. Numer. Meth. Engng 31 (1991) 19-52.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array
+from solvers.api import Array, FailureKind, StepFailed, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.rigid.body import RigidBody
 from solvers.rigid.rotation import rotation, skew, vector_rate
+
+#: Angle [rad] of one step from which rotation vectors are ambiguous.
+HALF_TURN = np.pi
 
 
 @dataclass(frozen=True)
@@ -164,3 +168,11 @@ def inertia_tangent(
     tangent[:3, :3] = share * rate * body.inertia.mass * np.eye(3)
     tangent[3:, 3:] = share * by_w
     return tangent
+
+
+def require_short_turns(field: str, bodies: Sequence[RigidBody], u: Array, info: StepInfo) -> None:
+    """Raise StepFailed for a body that rotates by half a turn or more in a step; u: increments, shape (bodies, 6)."""
+    for body, own in zip(bodies, u, strict=True):
+        if not np.linalg.norm(own[3:]) < HALF_TURN:
+            reason = f"body '{body.name}' turned by more than half a turn: take a smaller time step"
+            raise StepFailed(field, FailureKind.MOTION, reason, iteration=info.iterations, history=info.residuals)

@@ -31,7 +31,7 @@ output: {fields_every: 0}
 """
 
 
-def simulation(folder, order):
+def simulation(folder, order, step=0.005):
     """The discs in a box, named in this order in the case: ten rows of five, a little beside their places."""
     rng = np.random.default_rng(1)
     lines = []
@@ -40,7 +40,8 @@ def simulation(folder, order):
         x, y = np.array([0.12 + 0.19 * across + 0.02 * (up % 2), 0.06 + 0.115 * up]) + 0.01 * rng.uniform(-1, 1, 2)
         mesh = f"{{shape: disc, radius: {RADIUS}, cells: [16, 1], translate: [{x:.5f}, {y:.5f}]}}"
         lines.append(f"    d{k}: {{mesh: {mesh}, free: {{density: 20}}}}\n")
-    (folder / "case.yaml").write_text(HEAD + "".join(lines[k] for k in order) + TAIL)
+    head = HEAD.replace("step: 0.005", f"step: {step}")
+    (folder / "case.yaml").write_text(head + "".join(lines[k] for k in order) + TAIL)
     return build(load_case(folder / "case.yaml"), MPI.COMM_SELF, Timer())
 
 
@@ -50,13 +51,14 @@ def overlap(bodies):
 
 
 @pytest.mark.slow
-def test_fifty_discs_fall_on_each_other(tmp_path):
+@pytest.mark.parametrize("step", [0.005, 0.01])
+def test_fifty_discs_fall_on_each_other(tmp_path, step):
     """No overlap, few iterations, momentum."""
-    found = simulation(tmp_path, range(50))
+    found = simulation(tmp_path, range(50), step)
     bodies = found.scheme.coupled.solid
     assert bodies.contact.standoff == pytest.approx(STANDOFF / 30.0)
     touched, momentum = 0, 0.0
-    for _, info in march(found.scheme, 0.3, 60):
+    for _, info in march(found.scheme, 0.3, round(0.3 / step)):
         assert overlap(bodies) < 1e-6 * RADIUS
         assert info.iterations <= 8
         momentum = max(momentum, info.numbers["interface.momentum"])

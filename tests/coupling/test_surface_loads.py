@@ -7,6 +7,7 @@ import pytest
 
 import fsci
 from solvers.api import Snapshot
+from solvers.fluid.flow.field import Fluid
 
 #: A channel flow around an elastic block on the floor, and a rigid disc above it.
 BODIES = """
@@ -66,6 +67,19 @@ def shares(body: Snapshot):
     edges = outer_edges(body)
     lengths = np.linalg.norm(body.points[edges[:, 1]] - body.points[edges[:, 0]], axis=1)
     return np.bincount(edges.ravel(), np.repeat(lengths / 2.0, 2), minlength=len(body.points))
+
+
+def test_the_force_is_computed_once_for_all_fields(tmp_path, monkeypatch):
+    """It serves elastic and rigid bodies."""
+    (tmp_path / "case.yaml").write_text(BODIES)
+    steps = fsci.build(fsci.load(tmp_path))
+    next(iter(steps))
+    counted, force = [], Fluid.force
+    monkeypatch.setattr(Fluid, "force", lambda fluid: counted.append(1) or force(fluid))
+    fields = steps.fields()
+    assert fields["block"].point_data["traction"].any()
+    assert fields["disc"].point_data["traction"].any()
+    assert len(counted) == 1
 
 
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])

@@ -100,13 +100,15 @@ MISTAKES = [
     (
         "probes:\n",
         "rigid: {bodies: {bar: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}, density: 1}}}\nprobes:\n",
-        "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+        "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'; outside of"
+        " the box it is dry",
     ),
     (
         "probes:\n",
         "contact:\n  obstacles:\n    bar: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}, on: top, "
         "free: {density: 1}}\nprobes:\n",
-        "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+        "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'; outside of"
+        " the box it is dry",
     ),
     ("stiffness: [3, 1]", "stiffness: 3, to: {body: disk, at: [0, 0]}", "there is no free rigid body 'disk'"),
     ("held: []", "pivot: [0.5, 0.5, 0.5]", "'pivot' must have 2 entries in 2D, not 3"),
@@ -125,6 +127,20 @@ def test_mistakes_are_located(tmp_path, right, wrong, message):
         load_case(write(tmp_path, SINKING.replace(right, wrong)))
     assert message in str(error.value)
     assert "case.yaml:" in str(error.value)
+
+
+@pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
+def test_a_body_outside_of_the_box_is_dry(tmp_path, scheme):
+    """It falls freely beside one in the flow."""
+    mesh = "{shape: disc, radius: 0.2, translate: [9, 0.5], cells: [24, 2]}"
+    beside = f"    dry: {{mesh: {mesh}, free: {{density: 2, gravity: [0, -5]}}}}\n"
+    text = SINKING.replace("{scheme: monolithic}", f"{{scheme: {scheme}}}").replace("coupling:", beside + "coupling:")
+    text = text.replace("probes:\n", "probes:\n  dry: {body: dry, quantity: centre}\n")
+    assert run_case(load_case(write(tmp_path, text)), tmp_path / "out") == FINISHED
+    found = read_history(tmp_path / "out" / "history.csv")
+    assert found["dry.y"] == pytest.approx(0.5 - 2.5 * found["time"] ** 2, abs=1e-12)
+    assert found["dry.x"] == pytest.approx(9.0, abs=1e-12)
+    assert np.abs(found["centre.x"] - 0.5).max() > 1e-6
 
 
 #: Values of the old setting in rad/s, and the new one, as messages say it.

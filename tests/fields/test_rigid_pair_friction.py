@@ -123,6 +123,33 @@ def test_mistakes_of_rigid_pairs(tmp_path, old, new, message):
     assert "case.yaml:1" in str(error.value)
 
 
+SHARED = "'floor' is also the name of a closed patch, which the body may touch; give one another name"
+
+
+def test_a_free_body_has_not_the_name_of_a_wall(tmp_path):
+    """Friction by pair could not tell them apart; an open patch and a body that nothing touches may share a name."""
+    text = (
+        WALLS.replace("  one: {", "  floor: {").replace("body: one", "body: floor").replace("floor, one", "floor, two")
+    )
+    with pytest.raises(CaseError) as error:
+        load_case(written(tmp_path, text))
+    (problem,) = error.value.problems
+    assert problem.message == SHARED
+    assert (problem.place.line, problem.place.column) == (10, 12)
+    load_case(written(tmp_path, WALLS.replace("    two: {", "    top: {").replace("body: two", "body: top")))
+    contact = WALLS[WALLS.index("contact: ") : WALLS.index("probes: ")]
+    off = WALLS.replace("    two: {", "    floor: {").replace("body: two", "body: floor")
+    load_case(written(tmp_path, off.replace(contact, "contact: none\n")))
+
+
+def test_a_pair_names_a_given_body_and_a_wall_at_once(tmp_path):
+    fixed = "    floor: {mesh: {shape: rectangle, size: [0.1, 0.1], cells: [1, 1], origin: [0.4, 0.2]}}\n    one: {"
+    with pytest.raises(CaseError) as error:
+        load_case(written(tmp_path, WALLS.replace("    one: {", fixed)))
+    (problem,) = error.value.problems
+    assert problem.message == "'floor' is a rigid body and a closed patch: give one another name"
+
+
 def test_without_free_bodies(tmp_path):
     text = WALLS.replace("free: {density: 3, held: [rotation]}", "slip_length: 0").replace("coupling: {}\n", "")
     text = text.replace("contact: {friction: {coefficient: 0.3}, ", "contact: {") + (

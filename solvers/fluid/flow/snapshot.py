@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from solvers.api import Array, Snapshot
@@ -10,10 +12,20 @@ from solvers.mesh.distributed import Nodal, gather_nodal
 from solvers.mesh.tessellation import tangential, vertex_shares
 
 
-def snapshots(fluid: Fluid) -> list[Snapshot]:
-    """Snapshots of the flow and of each body on rank 0, an empty list on others (collective)."""
-    flow, bodies = _flow(fluid), _bodies(fluid)
+def snapshots(fluid: Fluid, forces: Mapping[str, Array] | None = None) -> list[Snapshot]:
+    """Snapshots of the flow and of each body on rank 0, an empty list on others (collective).
+
+    forces: those of `surface_forces`, if they are known already.
+    """
+    flow, bodies = _flow(fluid), _bodies(fluid, surface_forces(fluid) if forces is None else forces)
     return [] if flow is None else [flow, *bodies]
+
+
+def surface_forces(fluid: Fluid) -> dict[str, Array]:
+    """Force [N] of the flow on the vertices of each body, zero before the first step (collective)."""
+    if fluid.bodies and fluid.started:
+        return fluid.force()
+    return {name: np.zeros_like(x) for name, x in fluid.moving.surfaces.by_name(fluid.cut.motion.x).items()}
 
 
 def _flow(fluid: Fluid) -> Snapshot | None:
@@ -56,13 +68,12 @@ def _corners(fluid: Fluid, degree: int) -> np.ndarray:
     return lattice[np.ix_(*indices)].ravel(order="F")
 
 
-def _bodies(fluid: Fluid) -> list[Snapshot]:
+def _bodies(fluid: Fluid, forces: Mapping[str, Array]) -> list[Snapshot]:
     """Rigid surfaces with their velocity, and traction and wall shear stress of the fluid (zero before the first step).
 
     Elastic bodies are in the snapshots of the structure.
     """
     found, start = [], 0
-    forces = fluid.force() if fluid.bodies and fluid.started else {}
     for body in fluid.bodies:
         surface, dim = body.surface, fluid.dim
         part = slice(start, start + surface.vertices)
@@ -70,7 +81,7 @@ def _bodies(fluid: Fluid) -> list[Snapshot]:
         if body.deforms:
             continue
         x, v = fluid.cut.motion.x[part], fluid.cut.motion.v[part]
-        force = forces.get(surface.name, np.zeros_like(x))
+        force = forces[surface.name]
         area, normals = vertex_shares(x, surface.facets)
         traction = np.divide(force, area[:, None], out=np.zeros_like(force), where=area[:, None] > 0.0)
         shear = tangential(traction, normals)
