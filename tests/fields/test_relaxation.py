@@ -235,6 +235,23 @@ def test_resumed_and_distributed_runs(tmp_path):
         assert two[name] == pytest.approx(whole[name], rel=1e-8, abs=1e-8), name
 
 
+def test_stresses_that_begin_to_relax_in_a_resumed_run(tmp_path):
+    """Have relaxed: a body in equilibrium stays there, and one whose stresses no longer relax goes there at once."""
+    (tmp_path / "case.yaml").write_text(CASE)
+    law = "structure.bodies.beam.material.viscous"
+    tips = {}
+    for name, before, after in (("on", "[]", "[{share: 0.4, time: 0.2}]"), ("off", "[{share: 0.4, time: 9}]", "[]")):
+        out = tmp_path / name
+        for words in (("run", tmp_path, "-o", out, "--set", "time.end=0.3", "--set", f"{law}={before}"),
+                      ("resume", out, "--set", "time.end=0.5", "--set", f"{law}={after}")):  # fmt: skip
+            ended = fsci(*words)
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+        tips[name] = read_history(out / "history.csv")["tip.y"]
+    assert tips["on"][2:] == pytest.approx(tips["on"][1], rel=1e-7)
+    assert tips["off"][2] > 0.9 * tips["on"][2]
+    assert tips["off"][3:] == pytest.approx(tips["on"][1], rel=1e-7)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
