@@ -5,6 +5,7 @@ from solvers.lazy import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
+        "active": ["Active"],
         "body": ["Body"],
         "field": ["Structure"],
         "loads": ["LineForce", "PointForce", "Pressure", "Traction"],
@@ -13,6 +14,7 @@ __getattr__, __all__ = lazy_names(
             *("CoupNeoHooke", "HolzapfelGasserOgden", "LinearElastic", "MooneyRivlin", "NeoHooke"),
             *("StVenantKirchhoff", "Yeoh"),
         ],
+        "relaxation": ["Branch"],
         "springs": ["Spring"],
         "supports": ["Roller", "Support", "Symmetry"],
         "dynamics": ["Damping", "Dynamics"],

@@ -235,6 +235,62 @@ def test_resumed_and_distributed_runs(tmp_path):
         assert two[name] == pytest.approx(whole[name], rel=1e-8, abs=1e-8), name
 
 
+def test_stresses_that_begin_to_relax_in_a_resumed_run(tmp_path):
+    """Have relaxed: a body in equilibrium stays there, and one whose stresses no longer relax goes there at once."""
+    (tmp_path / "case.yaml").write_text(CASE)
+    law = "structure.bodies.beam.material.viscous"
+    tips = {}
+    for name, before, after in (("on", "[]", "[{share: 0.4, time: 0.2}]"), ("off", "[{share: 0.4, time: 9}]", "[]")):
+        out = tmp_path / name
+        for words in (("run", tmp_path, "-o", out, "--set", "time.end=0.3", "--set", f"{law}={before}"),
+                      ("resume", out, "--set", "time.end=0.5", "--set", f"{law}={after}")):  # fmt: skip
+            ended = fsci(*words)
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+        tips[name] = read_history(out / "history.csv")["tip.y"]
+    assert tips["on"][2:] == pytest.approx(tips["on"][1], rel=1e-7)
+    assert tips["off"][2] > 0.9 * tips["on"][2]
+    assert tips["off"][3:] == pytest.approx(tips["on"][1], rel=1e-7)
+
+
+BALL = """
+time: {step: 0.01, end: 1.6}
+structure:
+  dynamics: {rho_inf: 0.8}
+  bodies:
+    ball:
+      mesh: {shape: disc, radius: 0.5, cells: [24, 2], translate: [0, 0.7]}
+      material: {law: neo_hooke, E: 2000, nu: 0.3, density: 20, viscous: [{share: 0.4, time: 0.05}]}
+      gravity: [0, -1]
+contact:
+  obstacles:
+    bottom: {mesh: {shape: rectangle, size: [3, 0.1], cells: [1, 1], origin: [-1.5, -0.1]}, on: top}
+  pairs:
+    bottom: {slave: {body: ball, on: outer}, master: {obstacle: bottom}}
+probes:
+  ball: {body: ball, quantity: centre}
+output: {fields_every: 1000}
+"""
+
+
+@pytest.mark.slow
+def test_a_ball_rebounds_less(tmp_path):
+    """From contact with surfaces without mass; the same with half of the step, and without warnings of energy."""
+    (tmp_path / "case.yaml").write_text(BALL)
+    heights = {}
+    for name, change in (
+        ("ball", "time.step=0.01"),
+        ("fine", "time.step=0.005"),
+        ("elastic", "structure.bodies.ball.material.viscous=[]"),
+    ):
+        ended = fsci("run", tmp_path, "-o", tmp_path / name, "--set", change)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        assert "warning" not in ended.stdout
+        found = read_history(tmp_path / name / "history.csv")
+        heights[name] = found["ball.y"][found["time"] > 0.9].max() - 0.5
+    assert heights["fine"] == pytest.approx(heights["ball"], rel=0.01)
+    assert heights["ball"] < 0.7 * heights["elastic"]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
