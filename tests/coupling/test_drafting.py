@@ -28,6 +28,9 @@ coupling: {scheme: monolithic}
 output: {fields_every: 0}
 """
 
+#: Times [s] of the first touch and of equal heights on this grid; 48 by 144 cells have 0.181 and 0.281 s.
+FIRST_TOUCH, EQUAL_HEIGHTS = 0.173, 0.286
+
 
 @pytest.mark.slow
 def test_drafting_kissing_tumbling(tmp_path):
@@ -38,7 +41,9 @@ def test_drafting_kissing_tumbling(tmp_path):
     contact, touched, distances, level, worst = bodies.contact, [], [], np.inf, 0
     for t, info in march(found.scheme, 0.3, 300):
         assert (contact.standoff - contact.near.gap).max(initial=0.0) < 1e-6 * 0.125
-        upper, lower = (body.inertia.centre + now.shift[:2] for body, now in zip(bodies.bodies, bodies.now, strict=True))
+        upper, lower = (
+            body.inertia.centre + now.shift[:2] for body, now in zip(bodies.bodies, bodies.now, strict=True)
+        )
         distances.append(np.linalg.norm(upper - lower))
         if contact.active.any():
             touched.append(t)
@@ -46,8 +51,8 @@ def test_drafting_kissing_tumbling(tmp_path):
             level = min(level, t)
         worst = max(worst, info.iterations)
     assert worst <= 8
-    assert touched[0] == pytest.approx(KISSING, rel=0.05)
-    assert level == pytest.approx(LEVEL, rel=0.05)
+    assert touched[0] == pytest.approx(FIRST_TOUCH, rel=0.05)
+    assert level == pytest.approx(EQUAL_HEIGHTS, rel=0.05)
     assert touched[-1] < level
     assert distances[49] > 0.495  # drafting has hardly begun
     assert distances[-1] > 1.2 * 0.25
