@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 #: While contact is closed, its force would have to pull, and while it is open, the fluid closes it.
 NO_STATE = (
     "a fluid at {pull:.3g} Pa below zero pulls at bodies that are dry where they touch, and may have no state open or "
-    "closed: 'contact.film.zone: wetted' gives closed contact the pressure around it"
+    "closed: 'contact.film.zone: wetted' gives closed contact the pressure around it, "
+    "and 'contact.film.roughness' lets fluid between flat surfaces that part"
 )
 
 

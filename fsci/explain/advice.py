@@ -11,6 +11,7 @@ from solvers.api import FailureKind
 
 SHORTER = "a smaller time.step"
 SMOOTH_LOADS = "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"
+PARTING = "in a fluid: contact.film.roughness, where flat surfaces part and nothing else lets fluid between them"
 
 OF_KIND: dict[FailureKind, tuple[str, ...]] = {
     FailureKind.NOT_FINITE: (SHORTER, SMOOTH_LOADS),
@@ -23,9 +24,9 @@ OF_KIND: dict[FailureKind, tuple[str, ...]] = {
         SHORTER,
         "slave and master exchanged: the slave should be the softer or finer side",
         "a finer slave surface at the edge of the contact zone",
-        "in a fluid: contact.film.roughness, where flat surfaces part and nothing else lets fluid between them",
+        PARTING,
     ),
-    FailureKind.SUCTION: ("contact.film.zone=wetted",),
+    FailureKind.SUCTION: ("contact.film.zone=wetted", PARTING),
     FailureKind.LIMIT_POINT: ("structure.dynamics: past a limit point a structure snaps, and has inertia",),
     FailureKind.UNSUPPORTED: ("supports or weak springs: a static body without them has no unique solution",),
     FailureKind.INVERTED: (

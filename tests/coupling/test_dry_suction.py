@@ -53,6 +53,7 @@ def test_without_a_state_the_failure_says_why(tmp_path, capsys, scheme):
     words = said.out + said.err
     assert "below zero pulls at bodies that are dry where they touch" in words
     assert "'contact.film.zone: wetted' gives closed contact the pressure around it" in words
+    assert "'contact.film.roughness' lets fluid between flat surfaces that part" in words
     require_explained(tmp_path / "run", FailureKind.SUCTION)
 
 

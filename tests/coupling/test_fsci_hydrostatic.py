@@ -48,6 +48,28 @@ def test_block_pressed_and_lifted(tmp_path):
     assert np.abs(history["fluid.mass"]).max() < 1e-9  # what comes under it
 
 
+@pytest.mark.slow
+def test_a_resolved_film_does_not_let_a_smooth_block_go(tmp_path):
+    """Stefan: a step of backward Euler leads to g = 2 L (mu / (p dt))^(1/2), 5 m. The fluid in a layer lets it go.
+
+    Then contact carries F alone.
+    """
+    settings = ("--set", "fluid.element=q2q1", "--set", "output.fields_every=0")
+    smooth = fsci("run", "cases/hydrostatic_contact", "-o", tmp_path / "smooth", *settings)
+    assert smooth.returncode != 0
+    assert "'contact.film.roughness' lets fluid between flat surfaces that part" in smooth.stdout + smooth.stderr
+    fsci(
+        "run", "cases/hydrostatic_contact", "-o", tmp_path / "layer", *settings,
+        "--set", "contact.film.transmissivity=1e-6",
+    )  # fmt: skip
+    history = read_history(tmp_path / "layer" / "history.csv")
+    t, contact = history["time"], history["contact.bottom.y"]
+    assert t[-1] == pytest.approx(2.05)
+    assert np.diff(t)[1:] == pytest.approx(0.05)
+    assert contact[np.argmin(np.abs(t - 1.0))] == pytest.approx(2.0 * 0.33, rel=1e-6)
+    assert history["contact.active"][-1] == 0
+
+
 #: (until [s], pressure on the block [Pa]) above that at which it lets go; each is reached within 0.2 s.
 LOADS = ((1.0, 2.0), (2.0, 0.5))
 
