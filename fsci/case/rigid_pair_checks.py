@@ -55,7 +55,9 @@ def shared_names(case: Case) -> Iterator[Mistake]:
         return
     for name in case.fluid.free_bodies:
         if name in walls:
-            message = f"'{name}' is also the name of a closed patch, which the body may touch; give one another name"
+            message = (
+                f"'{name}' is also the name of a closed patch, which the body may touch: give one of them another name"
+            )
             yield ("fluid", "bodies", name), message
 
 

@@ -123,7 +123,7 @@ def test_mistakes_of_rigid_pairs(tmp_path, old, new, message):
     assert "case.yaml:1" in str(error.value)
 
 
-SHARED = "'floor' is also the name of a closed patch, which the body may touch; give one another name"
+SHARED = "'floor' is also the name of a closed patch, which the body may touch: give one of them another name"
 
 
 def test_a_free_body_has_not_the_name_of_a_wall(tmp_path):
@@ -147,7 +147,7 @@ def test_a_pair_names_a_given_body_and_a_wall_at_once(tmp_path):
     with pytest.raises(CaseError) as error:
         load_case(written(tmp_path, WALLS.replace("    one: {", fixed)))
     (problem,) = error.value.problems
-    assert problem.message == "'floor' is a rigid body and a closed patch: give one another name"
+    assert problem.message == "'floor' is a rigid body and a closed patch: give one of them another name"
 
 
 def test_without_free_bodies(tmp_path):
