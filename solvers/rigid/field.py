@@ -117,8 +117,7 @@ class RigidBodies:
 
     def begin_step(self, t: float, dt: float, held: Array | None = None) -> None:
         """Store the state at t; held: increments of held components, shape (bodies, 6), None: by their functions."""
-        self.old, self.on_surface_old = list(self.now), self.on_surface.copy()
-        self.pressed_old = self.pressed.copy()
+        self.old, self.on_surface_old, self.pressed_old = list(self.now), self.on_surface.copy(), self.pressed.copy()
         self.current, self._noise = Step(t + dt, dt), None
         if self.contact is not None:
             self.contact.begin_step()
@@ -139,7 +138,8 @@ class RigidBodies:
         """The same beside a flow: bodies do not enter others. Alone, Newton's method is as quick to find this."""
         self.extrapolate()
         if self.contact is not None:
-            leave_others(self.contact, self._by_component(self._u), self._measure, self._system, self._add)
+            with self.timer("contact"):
+                leave_others(self.contact, self._by_component(self._u), self._measure, self._system, self._add)
             self._last = self._u - self._held_u
 
     def increments(self) -> Array:
@@ -167,7 +167,8 @@ class RigidBodies:
 
     def end_step(self) -> None:
         """Accept the step; with contact, velocities and rates of momentum are those after the impact."""
-        self._end_contact()
+        with self.timer("contact"):
+            self._end_contact()
         for body, now, old in zip(self.bodies, self.now, self.old, strict=True):
             self._exchanged += abs(motion.kinetic_energy(body, now) - motion.kinetic_energy(body, old))
 
@@ -182,12 +183,11 @@ class RigidBodies:
             return
         inertia = np.array([motion.mass(body, now.R) for body, now in zip(self.bodies, self.now, strict=True)])
         mass = block_diagonal(self._without_held(inertia[:, self.components][:, :, self.components]))
-        before, weight = self._velocity(self.old), self.force_weight
+        before, weight, w = self._velocity(self.old), self.force_weight, self._pressed_weight
         force, force_before = (
             self._by_component(np.array([one.load for one in some]) + by_flow)
             for some, by_flow in ((self.now, self.on_surface), (self.old, self.on_surface_old))
         )
-        w = self._pressed_weight
         mean = weight * force + (1.0 - weight) * force_before
         gyroscopic = self._by_component(
             np.array([motion.gyroscopic(b, i) for b, i in zip(self.bodies, self.now, strict=True)])
@@ -289,8 +289,8 @@ class RigidBodies:
         self.balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
             return self._norms(self.balance)
-        self._measure()
-        with supported():
+        with self.timer("contact"), supported():
+            self._measure()
             self.contact.press(self._system(), -self.balance)
         return self._norms(self.balance - self.contact.force)
 
