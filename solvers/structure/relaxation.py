@@ -71,6 +71,7 @@ class Relaxing:
         self._weights = of_cells.weights
         self._cells = fem.input_cells(domain)[: len(self._blocks)]  #: their numbers in the mesh file
         self._decay, self._mean = np.ones(len(self._b)), np.ones(len(self._b))
+        self._fit: tuple[Any, Any, Array, Array] | None = None  #: see `_assemble_fit`
         self._start: tuple[Array, Array, Array] | None = None  #: S_D [Pa], strain and q [Pa] at the start of the step
 
     def energy(self, F: Tensor) -> Tensor:
@@ -147,24 +148,21 @@ class Relaxing:
         by_entry = {(i, j): fem.function(space) for i in range(3) for j in range(i, 3)}
         return [[by_entry[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
 
-    @cached_property
-    def _fit(self) -> tuple[Any, Any, Array, Array]:
+    def _assemble_fit(self) -> tuple[Any, Any, Array, Array]:
         """An entry at the points, the form of its right-hand side, unknowns of the cells, and inverse mass matrices."""
-        space = self._smooth[0][0].function_space
-        dx = fem.volume_measure(self._domain, self._degree)
-        q, r = ufl.TestFunction(space), ufl.TrialFunction(space)
-        entry = fem.function(fem.quadrature_space(self._domain, self._degree))
-        mass, cells = fem.compile_form(q * r * dx), np.sort(fem.cell_blocks(space)[: len(self._blocks)], axis=1)
-        return (
-            entry,
-            fem.compile_form(entry * q * dx),
-            cells,
-            np.linalg.inv(by_cells(fem.create_matrix(mass), mass, cells)),
-        )
+        if self._fit is None:
+            space = self._smooth[0][0].function_space
+            dx = fem.volume_measure(self._domain, self._degree)
+            q, r = ufl.TestFunction(space), ufl.TrialFunction(space)
+            entry = fem.function(fem.quadrature_space(self._domain, self._degree))
+            mass, cells = fem.compile_form(q * r * dx), np.sort(fem.cell_blocks(space)[: len(self._blocks)], axis=1)
+            inverse = np.linalg.inv(by_cells(fem.create_matrix(mass), mass, cells))
+            self._fit = entry, fem.compile_form(entry * q * dx), cells, inverse
+        return self._fit
 
     def prepare_output(self) -> None:
         self._element.prepare_output()
-        entry, right, cells, inverse_mass = self._fit
+        entry, right, cells, inverse_mass = self._assemble_fit()
         blocks = fem.cell_blocks(entry.function_space)[: len(self._blocks)]
         history = self._history.x.array.reshape(-1, 3, 3)[self._blocks]
         for i in range(3):
