@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from solvers import fem
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
-from solvers.fluid.geometry.pieces import joined_pieces, parts_of_facets, selected
-from solvers.fluid.geometry.triangle_pieces import parts_of_triangles
+from solvers.fluid.geometry.pieces import joined_pieces, selected
+from solvers.fluid.geometry.regions import pieces_of_regions
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.periodic import BEYOND_NODES, LatticeNodes
 from solvers.mesh.gauss import tensor_weights
@@ -50,27 +50,20 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     for number, of_cell in sheets.shares.items():
         if (cell := local[number]) >= 0 and (found := of_cell.integrals(points)) is not None:
             fluid[place[cell]], fraction[cell] = found / weights, of_cell.fraction
-    piece_box, target = grid.numbers[cut.cut[cut.pieces.cell]], np.full(len(cut.pieces.cell), -1)
-    for piece, (number, facet) in enumerate(zip(piece_box.tolist(), cut.pieces.facet.tolist(), strict=True)):
-        cells_there = sheets.successors.get(number)
-        if cells_there is None:
-            owner = number
+    # pieces of cells whose fluid is shared are those of the table, but where its regions are not known
+    table = sheets.parts.geometry.table(len(points))
+    rows_of = np.full(len(table.cell), -1)
+    owner = np.arange(box)
+    owner[list(sheets.successors)] = -1
+    for number, of_cell in sheets.shares.items():
+        if of_cell.regions:
+            rows_of[of_cell.regions] = place[local[number]] if local[number] >= 0 else -1
         else:
-            owner = next((c for c in cells_there if sheets.shares[c].has(facet)), None)
-        target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
-
-    touching = [
-        (place[cell], surface[counts[surface[:, 0].astype(int)]])
-        for number, of_cell in sheets.shares.items()
-        if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
-    ]
-    parts = [selected(cut.pieces, target)]
-    if touching:
-        row = np.repeat([row for row, _ in touching], [len(surface) for _, surface in touching])
-        surface = np.concatenate([surface for _, surface in touching])
-        parts_of = parts_of_facets if grid.dim == 2 else parts_of_triangles
-        there = grid.numbers[cells[row]]
-        parts.append(parts_of(grid.grid, there, row, surface, cut.facets, cut.motion.x, points))
+            owner[sheets.box_cells(np.array([number]))] = number
+    target = owner[grid.numbers[cut.cut[cut.pieces.cell]]]
+    target = np.where((target >= 0) & (local[target] >= 0), place[local[target]], -1)
+    own = pieces_of_regions(table, points, grid.grid, cut.facets, cut.motion.x, rows_of)
+    parts = [selected(cut.pieces, target), selected(own, np.where(counts[own.facet], own.cell, -1))]
     return replace(
         cut,
         uncut=cut.uncut[~(empty | new)[cut.uncut]],
