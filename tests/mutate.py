@@ -76,7 +76,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "thin": (
         tuple(f"solvers/fluid/geometry/thin/{name}.py" for name in (
-            "closing", "sheet_cycles", "sheet_nodes", "sheet_parts", "sheet_windows", "sheets", "thickness", "thinness",
+            "closing", "fluid_parts", "sheet_cycles", "sheet_nodes", "sheet_windows", "sheets", "thickness", "thinness",
         )),
         ("fluid_thin", "fluid_thin_space", "fluid_thin_moving", "fluid_thin_space_moving", "fluid_touching",
          "fluid_triangle_pieces", "thin_rigid", "thin_elastic"),
