@@ -66,9 +66,16 @@ def test_facet_that_is_nearly_in_the_plane():
     assert not lines[..., 0].any()
 
 
-def test_end_of_what_is_closed_crosses_no_plane():
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [[0.5, 1.2, 0.1], [0.5, -1e-20, 0.1], [0.5, -6e-7, 0.9]],
+        [[0.5, -3e-6, 0.1], [0.9, 3e-6, 0.1], [0.5, 3e-6, 0.9]],
+    ],
+)
+def test_end_of_what_is_closed_crosses_no_plane(corners):
     """Its normal is an axis, not that of the facet beside it: with it, the slope s of that facet was zero."""
-    x = np.array([[[0.5, 1.2, 0.1], [0.5, -1e-20, 0.1], [0.5, -6e-7, 0.9]]])
+    x = np.array([corners])
     at, ones = gauss(3)[0], np.ones(3)
     reference = np.stack([tensor(*[at if k == axis else ones for k in range(3)]) for axis in range(3)], axis=1)
     sides, cell = np.ones((1, 3, 2), dtype=bool), (np.zeros((1, 3)), np.ones((1, 3)))

@@ -22,7 +22,7 @@ from solvers.mesh.tessellation import unit_normals
 #: Gauss points on a line: exact for a basis of degree 4 in two directions and barycentric coordinates.
 ON_LINE = 5
 
-#: Difference of the product of unit normals from one that is rounding error.
+#: Difference of unit normals that is rounding error.
 SAME_NORMAL = 1e-9
 
 
@@ -60,7 +60,9 @@ def crossing_moments(
     found = np.zeros((pieces, dim, len(reference), dim))
     t, weights = gauss(ON_LINE) if dim == 3 else (np.zeros(1), np.ones(1))
     local = (x - origin[:, None]) / sizes[:, None]
-    own = np.abs((n * unit_normals(x)).sum(axis=1)) > 1.0 - SAME_NORMAL
+    facing = unit_normals(x)
+    facing *= np.sign((n * facing).sum(axis=1))[:, None]
+    own = np.abs(n - facing).max(axis=1, initial=0.0) < SAME_NORMAL
     for axis in range(dim):
         for side in (0, 1):
             some, ends = _line(local[:, :, axis] - side, own & sides[:, axis, side])
