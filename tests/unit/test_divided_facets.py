@@ -75,7 +75,7 @@ def brick(n):
         for side in (0.0, 1.0):
             x, facets = plate(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), up=side > 0.0)
             found.append(facets + sum(map(len, points)))
-            points.append(np.roll(x + [0.0, 0.0, side], axis, axis=1))
+            points.append(np.roll(x + np.array([0.0, 0.0, side]), axis, axis=1))
     unique, number = np.unique(np.concatenate(points).round(12), axis=0, return_inverse=True)
     return unique, number.ravel()[np.concatenate(found)]
 
