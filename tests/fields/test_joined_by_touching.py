@@ -22,7 +22,7 @@ def test_flaps_that_touch_and_open_within_a_step():
     ]
 
     def at(way):
-        x = np.concatenate([low + [way, 0.0], high])
+        x = np.concatenate([low + np.array([way, 0.0]), high])
         return Motion(x, 0.0 * x)
 
     apart, touching = at(0.0), at(0.0101)
