@@ -65,17 +65,19 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "geometry": (
         (
             *(f"solvers/cut_cells/{name}.py" for name in ("components", "heights", "layer", "make", "surfaces")),
-            *(f"solvers/fluid/geometry/{name}.py" for name in ("bodies", "overlaps", "pieces", "regions", "tied_slits")),
+            *(f"solvers/fluid/geometry/{name}.py" for name in (
+                "bodies", "overlaps", "pieces", "regions", "tied_slits",
+            )),
         ),
         ("cut_cells", "cut_cells_again", "cut_cells_closing", "cut_cells_oracles", "cell_regions", "fluid_pieces",
-         "fluid_triangle_pieces", "fluid_overlaps", "fluid_slits", "fluid_touching", "fluid_touching_space"),
+         "fluid_overlaps", "fluid_slits", "fluid_touching", "fluid_touching_space"),
     ),
     "thin": (
         tuple(f"solvers/fluid/geometry/thin/{name}.py" for name in (
             "closing", "fluid_parts", "sheet_cycles", "sheet_nodes", "sheet_windows", "sheets", "thickness", "thinness",
         )),
         ("fluid_thin", "fluid_thin_space", "fluid_thin_moving", "fluid_thin_space_moving", "fluid_touching",
-         "fluid_triangle_pieces", "thin_rigid", "thin_elastic"),
+         "thin_rigid", "thin_elastic"),
     ),
     "films": (
         (
