@@ -39,26 +39,29 @@ class Pieces:
 
 
 def in_planes(grid: Grid, x: Array, share: float = 0.0) -> Array:
-    """Vertices [m], those beside a plane of the grid by rounding, or by a share of the smallest cell, put into it.
+    """Vertices [m], those beside a plane of the grid by rounding, or by a share of the larger cell at it, put into it.
 
     Then the kernel knows from the normal which of the two cells has the fluid.
     """
     placed = x.copy()
     for axis, edge in enumerate(grid.edges):
         above = np.clip(np.searchsorted(edge, x[:, axis]), 1, len(edge) - 1)
-        reach = max(ROUNDING_OF_POSITION * float(np.abs(edge).max()), share * float(np.diff(edge).min()))
-        for plane in (edge[above - 1], edge[above]):
-            near = np.abs(x[:, axis] - plane) <= reach
-            placed[near, axis] = plane[near]
+        size = np.diff(edge)
+        at_plane = np.maximum(np.append(size[:1], size), np.append(size, size[-1:]))
+        reach = np.maximum(ROUNDING_OF_POSITION * float(np.abs(edge).max()), share * at_plane)
+        for plane in (above - 1, above):
+            near = np.abs(x[:, axis] - edge[plane]) <= reach[plane]
+            placed[near, axis] = edge[plane[near]]
     return placed
 
 
 def without_slivers(grid: Grid, facets: Indices, x: Array) -> Array:
     """Vertices [m] without slivers of fluid between facets and planes of the grid that the cut takes for solid.
 
-    Those beside a plane by `NOTHING` are put into it, and facets on the boundary of the box, see `off_boundary`, too.
+    Those beside a plane by twice `NOTHING` are put into it: the mean of a wedge from the plane to there is `NOTHING`.
+    So are facets on the boundary of the box, see `off_boundary`.
     """
-    placed = in_planes(grid, x, NOTHING)
+    placed = in_planes(grid, x, 2.0 * NOTHING)
     for axis, edge in enumerate(grid.edges):
         near = FLUSH * float(np.diff(edge).min())
         for end in (edge[0], edge[-1]):

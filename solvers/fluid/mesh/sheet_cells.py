@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from solvers import fem
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
+from solvers.cut_cells import CutTable
 from solvers.fluid.geometry.pieces import joined_pieces, selected
 from solvers.fluid.geometry.regions import pieces_of_regions
+from solvers.fluid.geometry.thin.fluid_parts import FluidParts
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.periodic import BEYOND_NODES, LatticeNodes
 from solvers.mesh.gauss import tensor_weights
@@ -50,7 +52,6 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     for number, of_cell in sheets.shares.items():
         if (cell := local[number]) >= 0 and (found := of_cell.integrals(points)) is not None:
             fluid[place[cell]], fraction[cell] = found / weights, of_cell.fraction
-    # pieces of cells whose fluid is shared are those of the table, but where its regions are not known
     table = sheets.parts.geometry.table(len(points))
     rows_of = np.full(len(table.cell), -1)
     owner = np.arange(box)
@@ -60,8 +61,12 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
             rows_of[of_cell.regions] = place[local[number]] if local[number] >= 0 else -1
         else:
             owner[sheets.box_cells(np.array([number]))] = number
-    target = owner[grid.numbers[cut.cut[cut.pieces.cell]]]
+    cell_of_piece = grid.numbers[cut.cut[cut.pieces.cell]]
+    target = owner[cell_of_piece]
     target = np.where((target >= 0) & (local[target] >= 0), place[local[target]], -1)
+    region = _region_of_pieces(sheets.parts, table, cell_of_piece, cut.pieces.facet, counts)
+    target = np.where((target < 0) & (region >= 0), rows_of[region], target)
+    rows_of[np.isin(table.cell, cell_of_piece[region >= 0])] = -1
     own = pieces_of_regions(table, points, grid.grid, cut.facets, cut.motion.x, rows_of)
     parts = [selected(cut.pieces, target), selected(own, np.where(counts[own.facet], own.cell, -1))]
     return replace(
@@ -77,6 +82,30 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
         fraction=fraction,
         pieces=joined_pieces(parts),
     )
+
+
+def _region_of_pieces(
+    parts: FluidParts, table: CutTable, cell: Indices, facet: Indices, counts: NDArray[np.bool_]
+) -> Indices:
+    """Region that pieces of facets in cells of the box bound as a whole; -1: in this cell some facet does not.
+
+    Facets are divided where surfaces touch. All others meet with the same ends in two cells: what the table has of them
+    does so but for rounding errors over the sine of the angle to the planes of the grid, and no surface closes.
+    """
+    of_table = np.flatnonzero(counts[table.piece_facet])
+    keys = table.cell[table.piece_region[of_table]] * len(counts) + table.piece_facet[of_table]
+    wanted = cell * len(counts) + facet
+    order = np.argsort(keys, kind="stable")
+    of_table, keys = of_table[order], keys[order]
+    first, last = (np.searchsorted(keys, wanted, side=side) for side in ("left", "right"))
+    divided = np.zeros(len(table.state), dtype=bool)
+    divided[parts.touching] = divided[table.closed_cell] = True
+    divided[cell[last - first != 1]] = True
+    divided[table.cell[table.piece_region[of_table[~np.isin(keys, wanted)]]]] = True
+    found = np.full(len(cell), -1)
+    some = np.flatnonzero(~divided[cell])
+    found[some] = table.piece_region[of_table[first[some]]]
+    return found
 
 
 def _passable(
