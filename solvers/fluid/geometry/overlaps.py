@@ -64,7 +64,7 @@ class Unions:
         if not several.any():
             return unchanged
         table = cutter.cut(within_reach(grid, x))
-        touching = touching_cells(grid, moments, table, several)
+        touching = touching_cells(grid, moments, table, several, facets, x)
         row_of = np.full(grid.size, -1)
         row_of[moments.cells] = np.arange(len(moments.cells))
         row_of[~touching | (table.state == CellState.FLUID)] = -1

@@ -57,19 +57,29 @@ def with_several_bodies(grid: Grid, moments, body: Indices) -> Mask:
     return np.asarray(np.bincount(pairs // bodies, minlength=grid.size) > 1)
 
 
-def touching_cells(grid: Grid, moments, table: CutTable, several: Mask) -> Mask:
+def touching_cells(grid: Grid, moments, table: CutTable, several: Mask, facets: Indices, x: Array) -> Mask:
     """Mask of the cells in which bodies touch or overlap, among those with several bodies.
 
     Their union has less volume than they have together, or less surface, or something is closed.
-    moments: of `kernels.moments`, sums over the bodies.
+    moments: of `kernels.moments`, sums over the bodies; x: vertices [m], those on the boundary of the box exactly.
     """
     volume = np.where(table.state == CellState.FLUID, 1.0, np.bincount(table.cell, table.share, grid.size))
-    area = np.bincount(moments.cells[moments.piece_cell], moments.piece_mass.sum(axis=(1, 2)), grid.size)
+    within = ~_out_of_box(grid, x[facets])[moments.piece_facet]
+    area = np.bincount(moments.cells[moments.piece_cell], within * moments.piece_mass.sum(axis=(1, 2)), grid.size)
     area -= np.bincount(table.cell[table.piece_region], table.piece_area, grid.size)
     differ = np.abs(volume - 1.0 + moments.fraction) > SAME_VOLUME
     differ |= np.abs(area) > SAME_VOLUME * largest_faces(grid)
     differ[table.closed_cell] = True
     return np.asarray(several & differ)
+
+
+def _out_of_box(grid: Grid, corners: Array) -> Mask:
+    """Mask of the facets in faces of the box with the solid inside: they bound no fluid, though they have moments."""
+    normal, found = unit_normals(corners), np.zeros(len(corners), dtype=bool)
+    for axis, edge in enumerate(grid.edges):
+        for end, outward in ((0, -1.0), (-1, 1.0)):
+            found |= (corners[:, :, axis] == edge[end]).all(axis=1) & (outward * normal[:, axis] > 0.0)
+    return found
 
 
 def largest_faces(grid: Grid) -> Array:

@@ -138,7 +138,7 @@ def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> F
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True
     several = with_several_bodies(grid, moments, geometry.surfaces.body)
-    touching = np.flatnonzero(touching_cells(grid, moments, table, several))
+    touching = np.flatnonzero(touching_cells(grid, moments, table, several, surfaces.facets, x))
     total = np.bincount(table.cell, table.share, grid.size)
     with_surface = np.zeros(grid.size, dtype=bool)
     with_surface[moments.cells[moments.piece_cell]] = True
