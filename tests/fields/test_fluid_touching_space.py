@@ -177,3 +177,15 @@ def test_volume_of_the_fluid():
         overlap = (1.0 - shift) * t * (size - 0.1) * (size - 0.05)
         assert sheets.fluid.sum() / grid.size == pytest.approx(1.0 - 2.0 * t * size**2 + overlap, abs=1e-12)
         assert len(sheets.touching) > 0
+
+
+def test_bodies_that_are_apart_do_not_touch_at_the_sides_of_the_box():
+    """Two plates in one layer of cells, from one side of the box to the other, which has moments but bounds no fluid."""
+    grid = uniform([0.0, 0.0, 0.0], [2.0, 0.3, 1.0], [20, 3, 10])
+    one, facets = block([0.92, 0.0, 0.0], [0.95, 0.3, 0.64])
+    other, _ = block([0.96, 0.0, 0.37], [0.99, 0.3, 1.0])
+    both = np.concatenate([facets, facets + len(one)])
+    for apart, count in ((0.0, 0), (0.01, 12)):  # cells, four layers of three
+        x = np.concatenate([one + [apart, 0.0, 0.0], other])
+        sheets = find_sheets(grid, both, x, np.ones(len(both), dtype=bool))
+        assert len(sheets.touching) == count
