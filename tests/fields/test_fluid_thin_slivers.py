@@ -38,6 +38,7 @@ def test_plate_that_fills_a_cell_but_for_a_sliver(slivers, element):
 def test_surface_nearly_in_planes_of_the_grid_closes(angle):
     """Its pieces have common ends to the last bit: only their sum is rounded."""
     points, facets = block([-1.13, -0.015], [1.13, 0.015])
-    pieces = closed(uniform([0, 0], [3, 1], [30, 10]), (turned(points, angle) + [1.5, 0.512], facets)).cut.pieces
+    points = turned(points, angle) + np.array([1.5, 0.512])
+    pieces = closed(uniform([0, 0], [3, 1], [30, 10]), (points, facets)).cut.pieces
     lengths = pieces.moments.sum(axis=(1, 2))
     assert np.abs(lengths @ pieces.normal).max() < np.finfo(float).eps * lengths.sum()

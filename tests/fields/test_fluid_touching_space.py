@@ -180,12 +180,12 @@ def test_volume_of_the_fluid():
 
 
 def test_bodies_that_are_apart_do_not_touch_at_the_sides_of_the_box():
-    """Two plates in one layer of cells, from one side of the box to the other, which has moments but bounds no fluid."""
+    """Two plates in one layer of cells: their sides in faces of the box have moments, but bound no fluid."""
     grid = uniform([0.0, 0.0, 0.0], [2.0, 0.3, 1.0], [20, 3, 10])
     one, facets = block([0.92, 0.0, 0.0], [0.95, 0.3, 0.64])
     other, _ = block([0.96, 0.0, 0.37], [0.99, 0.3, 1.0])
     both = np.concatenate([facets, facets + len(one)])
     for apart, count in ((0.0, 0), (0.01, 12)):  # cells, four layers of three
-        x = np.concatenate([one + [apart, 0.0, 0.0], other])
+        x = np.concatenate([one + np.array([apart, 0.0, 0.0]), other])
         sheets = find_sheets(grid, both, x, np.ones(len(both), dtype=bool))
         assert len(sheets.touching) == count

@@ -11,10 +11,10 @@ from solvers.fluid.grid.box import Grid
 from solvers.mesh.lagrange import lagrange, lagrange_slopes
 from solvers.mesh.tessellation import unit_normals
 
-#: Gap, relative to the smallest cell, up to which surfaces touch: there is no fluid between them. Contact leaves gaps of
-#: 1e-9 to 3e-8. A wedge ends where it is as thin as this. Its end moves by 1 / angle of what the surfaces do, which no
-#: tangent knows: Newton's method converges linearly, at a rate that is proportional to this length. Between the leaflets
-#: of a valve it is 0.75 with 1e-6, 0.03 with 1e-7, and hardly seen with less.
+#: Gap, relative to the smallest cell, up to which surfaces touch: there is no fluid between them. Contact leaves gaps
+#: of 1e-9 to 1e-8. A wedge ends where it is as thin as this. Its end moves by 1 / angle of what the surfaces do, which
+#: no tangent knows: Newton's method converges linearly, at a rate that is proportional to this length. Between the
+#: leaflets of a valve it is 0.75 with 1e-6, 0.03 with 1e-7, 4e-4 with 1e-8.
 TOUCHING = 1e-7
 
 #: Gap, in rounding errors of a position, up to which two surfaces in 3D may be the same: 2 sqrt(3), and some more.
