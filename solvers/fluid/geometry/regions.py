@@ -101,7 +101,10 @@ def pieces_of_regions(table: CutTable, points: Array, grid: Grid, facets: Indice
     mass = np.swapaxes(moments, 1, 2) @ _at_points(table, points, grid, x[facets[facet]], table.piece_region[some])
     normal = -unit_normals(x[facets])
     surface = Pieces(row[some], facet, moments, 0.5 * (mass + np.swapaxes(mass, 1, 2)), normal[facet])
-    ends = _ends(table, points, grid, normal, np.flatnonzero((rows >= 0) & table.exact[table.cell]))
+    exact = np.flatnonzero((rows >= 0) & table.exact[table.cell])
+    if not len(exact):
+        return surface
+    ends = _ends(table, points, grid, normal, exact)
     region, axis = np.nonzero(
         np.abs(ends).max(axis=1, initial=0.0) > ROUNDING_OF_AREA * largest_faces(grid)[table.cell, None]
     )
