@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, Indices
-from solvers.cut_cells import CellCutter, CellState, ClosedSurfaces
+from solvers.cut_cells import CellCutter, ClosedSurfaces
 from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.regions import (
     length_of_rounding,
@@ -67,7 +67,9 @@ class Unions:
         touching = touching_cells(grid, moments, table, several, facets, x)
         row_of = np.full(grid.size, -1)
         row_of[moments.cells] = np.arange(len(moments.cells))
-        row_of[~touching | (table.state == CellState.FLUID)] = -1
+        with_fluid = np.zeros(grid.size, dtype=bool)  # others are solid, and have walls for fluid that enters
+        with_fluid[table.cell] = True
+        row_of[~(touching & with_fluid)] = -1
         some, row = row_of[row_of >= 0], row_of[table.cell]
         if not len(some):
             return unchanged
