@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from coupling.conforming_facets import conforming
 from solvers.algebra.connected import connected_parts
 from solvers.algebra.sparse import Sparse, sparse_from_entries
 from solvers.api import Array, Indices
@@ -54,10 +55,12 @@ def divide_facets(x: Array, facets: Indices, candidates: Sequence[tuple[NDArray[
         free, covered = _divide(x[facets[facet]], others)
         if not covered or _size(covered) < LEAST_PART:
             continue
-        free = [] if free and _size(free) < LEAST_PART else free
+        slivers = free if free and _size(free) < LEAST_PART else []
+        free = [] if slivers else free
         if not free and len(covered) == 1:
             tied[facet] = True
             continue
+        covered = covered + slivers
         divided[facet] = True
         for polygon, on_it in [(part, False) for part in free] + [(part, True) for part in covered]:
             numbers = count + np.arange(len(polygon))
@@ -78,12 +81,19 @@ def divide_facets(x: Array, facets: Indices, candidates: Sequence[tuple[NDArray[
     rows = np.concatenate([np.arange(len(x)), np.repeat(len(x) + np.arange(len(new)), facets.shape[1])])
     columns = np.concatenate([np.arange(len(x)), numbers[new].ravel()])
     values = np.concatenate([np.ones(len(x)), of[new].ravel()])
-    return DividedFacets(
-        found[solid],
-        np.concatenate(parents)[keep][solid],
-        np.concatenate([tied, more_tied]).astype(bool)[keep][solid],
-        sparse_from_entries(rows, columns, values, (len(x) + len(new), len(x))),
-    )
+    mixture = sparse_from_entries(rows, columns, values, (len(x) + len(new), len(x)))
+    found, parent = found[solid], np.concatenate(parents)[keep][solid]
+    is_tied = np.concatenate([tied, more_tied]).astype(bool)[keep][solid]
+    if x.shape[1] == 3:
+        near = 10.0 * NO_LENGTH * float(_edges(x[facets[divided]]).max())
+        found, of_found = conforming(mixture @ x, found, near)
+        parent, is_tied = parent[of_found], is_tied[of_found]
+    return DividedFacets(found, parent, is_tied, mixture)
+
+
+def _edges(corners: Array) -> Array:
+    """Lengths of the edges of facets, shape (facets, dim)."""
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2))
 
 
 def _once(x: Array, facets: Indices, more: Array) -> tuple[Indices, Indices]:
@@ -91,7 +101,7 @@ def _once(x: Array, facets: Indices, more: Array) -> tuple[Indices, Indices]:
 
     x, more: positions of vertices and of additional ones [m]; facets: those whose parts have the additional ones.
     """
-    size = float(np.linalg.norm(x[facets] - np.roll(x[facets], 1, axis=1), axis=2).min())
+    size = float(_edges(x[facets]).min())
     corners = np.unique(facets)
     at = np.concatenate([corners, len(x) + np.arange(len(more))])
     pairs = cKDTree(np.concatenate([x[corners], more])).query_pairs(10.0 * NO_LENGTH * size, output_type="ndarray")

@@ -65,21 +65,19 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "geometry": (
         (
             *(f"solvers/cut_cells/{name}.py" for name in ("components", "heights", "layer", "make", "surfaces")),
-            *(f"solvers/fluid/geometry/{name}.py" for name in ("overlaps", "pieces", "tied_slits", "triangle_pieces")),
-            *(f"solvers/fluid/geometry/regions/{name}.py" for name in (
-                "cell_regions", "face_regions", "region_integrals", "regions", "sliced_facets", "space_parts",
-                "touching_cells", "touching_regions", "wet_edges",
+            *(f"solvers/fluid/geometry/{name}.py" for name in (
+                "bodies", "overlaps", "pieces", "regions", "tied_slits",
             )),
         ),
         ("cut_cells", "cut_cells_again", "cut_cells_closing", "cut_cells_oracles", "cell_regions", "fluid_pieces",
-         "fluid_triangle_pieces", "fluid_overlaps", "fluid_slits", "fluid_touching", "fluid_touching_space"),
+         "fluid_overlaps", "fluid_slits", "fluid_touching", "fluid_touching_space"),
     ),
     "thin": (
         tuple(f"solvers/fluid/geometry/thin/{name}.py" for name in (
-            "closing", "sheet_cycles", "sheet_nodes", "sheet_parts", "sheet_windows", "sheets", "thickness", "thinness",
+            "closing", "fluid_parts", "sheet_cycles", "sheet_nodes", "sheet_windows", "sheets", "thickness", "thinness",
         )),
         ("fluid_thin", "fluid_thin_space", "fluid_thin_moving", "fluid_thin_space_moving", "fluid_touching",
-         "fluid_triangle_pieces", "thin_rigid", "thin_elastic"),
+         "thin_rigid", "thin_elastic"),
     ),
     "films": (
         (

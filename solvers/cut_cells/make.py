@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -41,14 +42,15 @@ class CellCutter:
         if self._dim == 2:
             self._facets, self._body = walls(surfaces.facets, surfaces.body)
             lines.append(np.array([0.0, smallest]))
-        self._kernel = kernels.CellCutter(
+        choices = (
             [np.ascontiguousarray(edge) for edge in lines],
             np.ascontiguousarray(points, dtype=float),
             np.ascontiguousarray(self._facets, dtype=np.int64),
             np.ascontiguousarray(self._body, dtype=np.int64),
             closing,
-            only_exact,
         )
+        self._kernel = kernels.CellCutter(*choices, only_exact)
+        self._exact = partial(kernels.CellCutter, *choices, True)
 
     def cut(self, x: Array, *, keep: bool = True) -> CutTable:
         """The table of vertices x [m], shape (vertices, dim); keep: cells for the next one."""
@@ -57,7 +59,11 @@ class CellCutter:
         if not np.isfinite(x).all():
             raise ValueError(f"vertex {np.flatnonzero(~np.isfinite(x).all(axis=1))[0]} is not finite")
         vertices = x if self._dim == 3 else wall_vertices(x, self._height)
-        found = self._kernel.cut(np.ascontiguousarray(vertices, dtype=float), keep)
+        vertices = np.ascontiguousarray(vertices, dtype=float)
+        try:
+            found = self._kernel.cut(vertices, keep)
+        except RuntimeError:  # cells of the fast kernel disagree on a face: a surface crosses itself
+            found = self._exact().cut(vertices, False)
         table = CutTable(
             shape=(*self._shape, 1) if self._dim == 2 else self._shape,
             quantum=found.quantum,

@@ -13,7 +13,6 @@ from ._kernels import (
     changed_rows,
     coarse_pattern,
     coarse_product,
-    divide_cells,
     moments,
     mortar,
     nodal_normals,

@@ -3,7 +3,6 @@
 
 void bind_coarse(nanobind::module_& module);
 void bind_cut(nanobind::module_& module);
-void bind_division(nanobind::module_& module);
 void bind_factors(nanobind::module_& module);
 void bind_kdop(nanobind::module_& module);
 void bind_moments(nanobind::module_& module);
@@ -14,7 +13,6 @@ NB_MODULE(_kernels, module)
 {
   bind_coarse(module);
   bind_cut(module);
-  bind_division(module);
   bind_factors(module);
   bind_kdop(module);
   bind_moments(module);

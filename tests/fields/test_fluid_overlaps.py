@@ -5,15 +5,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step
-from test_fluid_touching import overlap
+from test_fluid_touching import area_of, overlap
 
+from solvers import kernels
 from solvers.fluid.cut.cut import Cutter
 from solvers.fluid.flow.probes import of_fluid
-from solvers.fluid.geometry.regions.regions import area_of
-from solvers.fluid.geometry.regions.touching_regions import TOUCHING, touching_regions
+from solvers.fluid.geometry.overlaps import Unions
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.surfaces.surface import Motion
 from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.gauss import gauss
+from solvers.mesh.tessellation import unit_normals
 
 WEIGHT = 3.0
 
@@ -103,16 +105,23 @@ def balanced(fluid, area):
 
 
 @pytest.mark.parametrize("turns", range(4))
-@pytest.mark.parametrize("gap", [-0.2, -3.0 * TOUCHING, 3.0 * TOUCHING, 0.2])
+@pytest.mark.parametrize("gap", [-0.2, -1e-11, 1e-11, 0.2])
 def test_slit_between_two_bodies(gap, turns):
     """Two bodies fill a cell but for a slit, or overlap: fluid is where the slit is, however narrow."""
-    up, chords = np.array([[0.4, 0.0], [0.5, 0.4], [0.4, 1.0]]), []
-    for facet, corners in enumerate((up, up[::-1] + np.array([gap, 0.0]))):
-        for _ in range(turns):
-            corners = np.stack([1.0 - corners[:, 1], corners[:, 0]], axis=1)
-        chords.append((corners, [2 * facet, 2 * facet + 1]))
-    found = touching_regions(0, 1.0 - gap, chords)
-    assert sum(region.share for region in found) == pytest.approx(max(gap, 0.0), abs=1e-14)
+    up = np.array([[0.4, -1.0], [0.4, 0.0], [0.5, 0.4], [0.4, 1.0], [0.4, 2.0]])
+    one = np.concatenate([up, [[-1.0, 2.0], [-1.0, -1.0]]])
+    other = np.concatenate([up[::-1] + np.array([gap, 0.0]), [[2.0, -1.0], [2.0, 2.0]]])
+    x = np.concatenate([one, other]) - 0.5
+    for _ in range(turns):
+        x = np.stack([-x[:, 1], x[:, 0]], axis=1)
+    facets, points = np.concatenate([loop(7), loop(7) + 7]), gauss(3)[0]
+    grid = uniform([0, 0], [1, 1], [1, 1])
+    moments = kernels.moments(grid.edges, points, x + 0.5, facets, np.ones(1, dtype=bool))
+    normal = -unit_normals(x[facets])
+    found, _ = Unions(grid, points)(moments, facets, x + 0.5, normal, None)
+    assert max(0.0, 1.0 - found.fraction[0]) == pytest.approx(max(gap, 0.0), abs=1e-14)
+    if gap > 0.0:
+        assert found.piece_mass.sum() == pytest.approx(moments.piece_mass.sum(), abs=1e-12)
 
 
 def test_overlaps_that_rest_and_overlaps_that_move():

@@ -196,6 +196,20 @@ def test_tip_that_crosses_a_plane_to_and_fro():
         assert one.sheets(facets, far).node_count(1) == before[1]
 
 
+def test_the_place_at_the_start_of_a_step_is_no_iterate():
+    """An end that goes over a plane and comes back once has not been there twice: its two sides stay parted."""
+    grid = uniform([0, 0], [3, 1], [30, 10])
+    plate, facets = block([0.23, 0.51], [1.3, 0.54])
+    short, far = (Motion(plate + np.array([way, 0.0]), 0.0 * plate) for way in (-1e-5, 1e-5))
+    thin = ThinBodies(grid, [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))], False, None)
+    parted, joined = (thin.sheets(facets, motion).node_count(1) for motion in (far, short))
+    thin.begin_step()
+    thin.sheets(facets, far)
+    thin.begin_step()
+    counts = [thin.sheets(facets, motion).node_count(1) for motion in (far, short, far, short, far)]
+    assert counts == [parted, joined, parted, joined, joined]
+
+
 def test_body_that_becomes_thin_by_turning():
     """A plate of 4.5 cells, first parallel to the grid: the first position in a step decides, resumed or not."""
     grid = uniform([0, 0], [4, 4], [40, 40])

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, loop, make_fluid, step, turned
 
-from solvers.fluid.geometry.regions.regions import area_of
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.terms.boundary.patches import Patch
 
 H = 0.1
 DRAWS = (range(2), pytest.param(range(2, 20), marks=pytest.mark.slow))
+
+
+def area_of(polygon):
+    x, y = polygon.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def overlap(one, other):

@@ -5,10 +5,8 @@ import pytest
 from fluid_setup import block, body, field, solve_steady, step
 from thin_space import SIZE, duct, turn
 
-from solvers import kernels
-from solvers.fluid.geometry.regions.face_regions import in_cells
-from solvers.fluid.geometry.regions.sliced_facets import sliced_facets
-from solvers.fluid.geometry.regions.wet_edges import EdgeLattice
+from solvers.cut_cells import CellState, ClosedSurfaces, cut_cells
+from solvers.fluid.geometry.regions import closing_length
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform
 from solvers.mesh.gauss import gauss
@@ -96,32 +94,19 @@ def test_two_plates_that_close_a_duct(element):
     assert errors(fluid, np.zeros(3))[1] < 1e-7
 
 
-def divided(grid, facets, x, bodies):
-    """Result of the kernel for all cells with surface: (fluid by cell, largest gap in a boundary, area of surface).
+def divided(grid, facets, x, body):
+    """(fluid in the box by cell, largest gap in a boundary, area of surface) of the table.
 
     Shares of the cells, which are cubes, and areas of their faces.
     """
-    moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
-    polygons, lattice = sliced_facets(grid, facets, x), EdgeLattice(grid)
-    cells = np.unique(polygons.cell)
-    first = np.append(np.searchsorted(polygons.cell, cells), len(polygons.cell))
-    corners = np.ascontiguousarray(in_cells(lattice, polygons.cell, polygons.corners))
-    of_facet = in_cells(lattice, polygons.cell, x[facets[polygons.facet]])
-    n = unit_normals(of_facet)
-    planes = np.column_stack([n, (n * of_facet[:, 0]).sum(axis=1)])
-    body = bodies[polygons.facet]
-    fraction = moments.fraction
-    of, share, rows, triangles, state, _ = kernels.divide_cells(
-        first, fraction[cells], polygons.count, corners, planes, body, 1e-6
-    )
-    assert (state >= 0).all()
-    gap = np.zeros((len(share), 3))
-    ways = triangles[:, 1:] - triangles[:, :1]
-    np.add.at(gap, rows[:, 0], 0.5 * np.cross(ways[:, 0], ways[:, 1]))
-    fluid = np.clip(1.0 - fraction, 0.0, 1.0)
-    fluid[cells] = np.bincount(of, share, len(cells))
-    area = 0.5 * np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1)
-    return fluid, np.abs(gap).max(), area[rows[:, 1] < 0].sum()
+    table = cut_cells(grid.edges, gauss(3)[0], ClosedSurfaces(facets, body), x, closing=closing_length(grid))
+    fluid = np.where(table.state == CellState.FLUID, 1.0, np.bincount(table.cell, table.share, grid.size))
+    gap, face = np.zeros((len(table.cell), 3)), np.diff(grid.edges[0])[0] ** 2
+    np.add.at(gap, table.piece_region, table.piece_area[:, None] / face * unit_normals(x[facets])[table.piece_facet])
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        some = table.face_regions[:, side] >= 0
+        np.add.at(gap, (table.face_regions[some, side], table.face_axis[some]), sign * table.face_area[some])
+    return fluid, np.abs(gap).max(), table.piece_area.sum() / face
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-10, 1e-9, 1e-7, 1e-5, 1e-3])
@@ -192,3 +177,15 @@ def test_volume_of_the_fluid():
         overlap = (1.0 - shift) * t * (size - 0.1) * (size - 0.05)
         assert sheets.fluid.sum() / grid.size == pytest.approx(1.0 - 2.0 * t * size**2 + overlap, abs=1e-12)
         assert len(sheets.touching) > 0
+
+
+def test_bodies_that_are_apart_do_not_touch_at_the_sides_of_the_box():
+    """Two plates in one layer of cells: their sides in faces of the box have moments, but bound no fluid."""
+    grid = uniform([0.0, 0.0, 0.0], [2.0, 0.3, 1.0], [20, 3, 10])
+    one, facets = block([0.92, 0.0, 0.0], [0.95, 0.3, 0.64])
+    other, _ = block([0.96, 0.0, 0.37], [0.99, 0.3, 1.0])
+    both = np.concatenate([facets, facets + len(one)])
+    for apart, count in ((0.0, 0), (0.01, 12)):  # cells, four layers of three
+        x = np.concatenate([one + np.array([apart, 0.0, 0.0]), other])
+        sheets = find_sheets(grid, both, x, np.ones(len(both), dtype=bool))
+        assert len(sheets.touching) == count

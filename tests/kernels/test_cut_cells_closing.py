@@ -84,6 +84,20 @@ def test_any_length_closes_what_touches(name):
             assert np.abs(tables[0].closed_moments - table.closed_moments).max() < 1e-13
 
 
+def test_only_cells_that_the_plane_of_contact_crosses_are_dear():
+    """A pair of facets that touch is no concern of other cells around them: these need the exact kernel no oftener."""
+    for seed in range(12):
+        edges, x, facets, body = TOUCHING["plates"].pose(seed)
+        at = x[np.flatnonzero(UPPER[0][:, 0] == 0.0)]
+        normal = np.cross(at[1] - at[0], at[2] - at[0])
+        low, size = (np.stack([c.ravel(order="F") for c in np.meshgrid(*some, indexing="ij")], axis=1) for some in (
+            [edge[:-1] for edge in edges], [np.diff(edge) for edge in edges]))  # fmt: skip
+        crossed = np.abs((low + 0.5 * size - at[0]) @ normal) < 0.5001 * size @ np.abs(normal)
+        without, with_length = (table_of(edges, x, facets, body, closing=closing).exact for closing in (0.0, ANY))
+        assert not (with_length & ~without & ~crossed).any(), seed
+        assert (with_length & crossed).any(), seed
+
+
 def test_the_closed_part_is_where_blocks_touch():
     for seed in range(20):
         edges, facets, body, table = posed(TOUCHING["blocks"], seed, ANY)

@@ -1,16 +1,13 @@
-"""The table of the fluid in cut cells against voxels, the moments kernel and the finders of the fluid."""
+"""The table of the fluid in cut cells against voxels and the moments kernel."""
 
 import numpy as np
 import pytest
-from cut_scenes import EVEN, FAMILIES, STEPS, block, joined, rotation, sphere, table_of
+from cut_scenes import FAMILIES, STEPS, block, joined, table_of
 from fluid_setup import circle, loop
 from scipy import ndimage
 
 from solvers import kernels
 from solvers.cut_cells import CellState, components_of
-from solvers.fluid.geometry.regions.cell_regions import cell_regions
-from solvers.fluid.geometry.regions.space_parts import parts_in_space
-from solvers.fluid.geometry.thin.sheet_parts import links_of, parts_of_fluid
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import gauss
 
@@ -85,11 +82,6 @@ def test_blocks_against_voxels(first):
         assert table.piece_area.sum() == pytest.approx(surface, abs=1e-12), seed
 
 
-def by_cell_and_share(cells, shares):
-    order = np.lexsort((shares, cells))
-    return np.asarray(cells)[order], np.asarray(shares)[order]
-
-
 ONE_BODY = ("cube", "ball", "plate of 0.3", "plate of 1e-3", "plate of 1e-7", "plate within", "hollow")
 
 
@@ -108,55 +100,6 @@ def test_one_body_against_the_moments_kernel(name):
         order = np.argsort(keys)
         assert (keys[order] == moments.cells[moments.piece_cell] * len(facets) + moments.piece_facet).all()
         assert np.abs(table.piece_moments[order] - moments.piece_moments).max() < 1e-14
-
-
-@pytest.mark.parametrize("name", ONE_BODY)
-def test_one_body_against_the_finder_of_regions(name):
-    for seed in range(6):
-        edges, x, facets, body = FAMILIES[name].pose(seed)
-        table = table_of(edges, x, facets, body)
-        grid = Grid(edges)
-        moments = kernels.moments(edges, POINTS, table.vertices, facets, np.ones(grid.size, dtype=bool))
-        old = cell_regions(grid, facets, table.vertices, moments.fraction)
-        cells, shares = by_cell_and_share(old.cell, old.share)
-        mine, my_shares = by_cell_and_share(table.cell, table.share)
-        assert (cells == mine).all()
-        assert np.abs(shares - my_shares).max() < 1e-13
-
-
-def compared_with_parts(edges, x, facets, body, smallest=1e-8):
-    """Regions and links of the table and of `parts_in_space`, without regions that it takes for rounding."""
-    table, grid = table_of(edges, x, facets, body), Grid(edges)
-    moments = kernels.moments(edges, POINTS, table.vertices, facets, np.ones(grid.size, dtype=bool))
-    parts, links, *_ = parts_in_space(grid, moments, facets, table.vertices, 1)
-    cut = np.flatnonzero(table.state == CellState.CUT)
-    old = np.array([(part.cell, part.share) for part in parts if part.cell in set(cut.tolist())])
-    old = old[old[:, 1] > smallest]
-    some = table.share > smallest
-    cells, shares = by_cell_and_share(*old.T)
-    mine, my_shares = by_cell_and_share(table.cell[some], table.share[some])
-    assert (cells == mine).all()
-    assert np.abs(shares - my_shares).max() < 1e-8
-    pairs = np.array([(axis, parts[a].cell, parts[b].cell) for a, b, axis in links.tolist()])
-    both = np.isin(pairs[:, 1:], cut).any(axis=1)
-    inside = (table.face_cells >= 0).all(axis=1) & (table.face_area > smallest)
-    rows = np.column_stack([table.face_axis, table.face_cells])[inside]
-    assert (rows[np.lexsort(rows.T)] == pairs[both][np.lexsort(pairs[both].T)]).all()
-
-
-@pytest.mark.parametrize("name", ["plate of 1e-3", "overlapping cubes", "overlapping plates"])
-def test_against_parts_in_space(name):
-    """Regions and links, of one body and of bodies that overlap."""
-    for seed in range(4):
-        compared_with_parts(*FAMILIES[name].pose(seed))
-
-
-def test_three_random_bodies_against_parts_in_space():
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        shapes = block([-0.8, -0.5, -0.1], [0.7, 0.6, 0.1]), sphere((0, 0, 0), 0.7, 1), block([-0.4] * 3, [0.4] * 3)
-        bodies = [(x @ rotation(rng).T + 2.5 + rng.uniform(-0.6, 0.6, 3), facets) for x, facets in shapes]
-        compared_with_parts(EVEN, *joined(*bodies))
 
 
 # -------------------------------------------------------------------------------------------------------------- 2D
@@ -192,8 +135,8 @@ KINDS = ("disc", "plate", "leaf", "two plates", "ring")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_plane_against_the_moments_kernel_and_its_finder(kind):
-    """int L_q over the fluid and over pieces; regions; links."""
+def test_plane_against_the_moments_kernel(kind):
+    """int L_q over the fluid and over pieces."""
     for seed in range(8):
         edges = SQUARE_GRIDS[seed % 2]
         x, facets, body = plane_scene(seed, kind)
@@ -210,18 +153,6 @@ def test_plane_against_the_moments_kernel_and_its_finder(kind):
         assert np.abs(pieces[there] - moments.piece_moments).max() < 1e-12
         pieces[there] = 0.0
         assert not pieces.any()
-        parts, *_ = parts_of_fluid(grid, moments, facets, table.vertices, np.ones(len(facets), dtype=bool))
-        cut = set(np.flatnonzero(table.state == CellState.CUT).tolist())
-        old = np.array([(part.cell, part.share) for part in parts if part.cell in cut])
-        cells, shares = by_cell_and_share(*old.T)
-        mine, my_shares = by_cell_and_share(table.cell, table.share)
-        assert (cells == mine).all()
-        assert np.abs(shares - my_shares).max() < 1e-13
-        pairs = np.array([(axis, parts[a].cell, parts[b].cell) for a, b, axis in links_of(grid, parts).tolist()])
-        pairs = pairs[np.isin(pairs[:, 1:], list(cut)).any(axis=1)]
-        inside = (table.face_cells >= 0).all(axis=1) & (table.face_area > 1e-9)
-        rows = np.column_stack([table.face_axis, table.face_cells])[inside]
-        assert (rows[np.lexsort(rows.T)] == pairs[np.lexsort(pairs.T)]).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -64,3 +64,20 @@ def test_facet_that_is_nearly_in_the_plane():
     lines = crossing_moments(x, normal, np.zeros((1, 2)), np.ones((1, 2)), reference, sides)
     assert lines[..., 1].sum() == pytest.approx(-1.0 / slope, rel=1e-9)
     assert not lines[..., 0].any()
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [[0.5, 1.2, 0.1], [0.5, -1e-20, 0.1], [0.5, -6e-7, 0.9]],
+        [[0.5, -3e-6, 0.1], [0.9, 3e-6, 0.1], [0.5, 3e-6, 0.9]],
+    ],
+)
+def test_end_of_what_is_closed_crosses_no_plane(corners):
+    """Its normal is an axis, not that of the facet beside it: with it, the slope s of that facet was zero."""
+    x = np.array([corners])
+    at, ones = gauss(3)[0], np.ones(3)
+    reference = np.stack([tensor(*[at if k == axis else ones for k in range(3)]) for axis in range(3)], axis=1)
+    sides, cell = np.ones((1, 3, 2), dtype=bool), (np.zeros((1, 3)), np.ones((1, 3)))
+    assert crossing_moments(x, unit_normals(x), *cell, reference, sides)[..., 1].any()
+    assert not crossing_moments(x, np.array([[0.0, 1.0, 0.0]]), *cell, reference, sides).any()

@@ -68,6 +68,39 @@ def test_a_closed_surface_in_2d_stays_closed():
     assert found.tied.sum() == 2
 
 
+def brick(n):
+    """(vertices, triangles out of the solid) of the unit cube's surface, n x n squares on each side."""
+    points, found = [], []
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            x, facets = plate(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), up=side > 0.0)
+            found.append(facets + sum(map(len, points)))
+            points.append(np.roll(x + np.array([0.0, 0.0, side]), axis, axis=1))
+    unique, number = np.unique(np.concatenate(points).round(12), axis=0, return_inverse=True)
+    return unique, number.ravel()[np.concatenate(found)]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+@pytest.mark.parametrize("bulge", [0.0, 0.02])
+def test_a_closed_surface_in_space_stays_closed(angle, bulge):
+    """Facets beside those that are divided are divided at the vertices in their edges, also where a side is bent."""
+    x, facets = brick(3)
+    x[:, 2] += bulge * np.sin(np.pi * x[:, 0]) * x[:, 2]
+    y, others = plate(np.linspace(0.21, 0.87, 3), np.linspace(0.1, 0.64, 5), up=False)
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    y = y @ turn.T + [0.1, 0.0, 1.0]
+    found = divide_facets(x, facets, [((x[facets][:, :, 2] > 0.99).all(axis=1), y[others])])
+    assert is_closed(found.facets)
+    points, area = areas(found, x)
+    whole = np.linalg.norm(area_vectors(x[facets]), axis=1)
+    assert np.bincount(found.parents, area, len(facets)) == pytest.approx(whole, rel=1e-9)
+    beside = found.parents[(points[found.facets][:, :, 2] < 0.99).any(axis=1)]
+    assert len(beside) > len(np.unique(beside)) or angle == 0.0
+    moved = np.random.default_rng(1).standard_normal((len(x), 3))
+    volume = np.linalg.det((found.mixture @ moved)[found.facets]).sum()
+    assert volume == pytest.approx(np.linalg.det(moved[facets]).sum(), rel=1e-9)
+
+
 def test_both_sides_have_the_same_vertices():
     """Whatever the bodies do, the tied parts of both sides lie on each other."""
     x, facets = line(np.linspace(0, 1, 6), 0.0, up=True)

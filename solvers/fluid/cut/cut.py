@@ -12,8 +12,16 @@ from solvers import kernels
 from solvers.api import Array, Indices32
 from solvers.fluid.cut.film import Films, Walls, creeping_cells, walls_of
 from solvers.fluid.cut.gaps import GapFinder, NarrowGaps
-from solvers.fluid.geometry.overlaps import Known, with_unions
-from solvers.fluid.geometry.pieces import NOTHING, Pieces, cells_across, in_planes, off_boundary, put_where_fluid_is
+from solvers.fluid.geometry.overlaps import Unions
+from solvers.fluid.geometry.pieces import (
+    NOTHING,
+    Pieces,
+    cells_across,
+    in_planes,
+    off_boundary,
+    put_where_fluid_is,
+    without_slivers,
+)
 from solvers.fluid.geometry.tied_slits import filled, slivers_of, without_slits
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
@@ -62,7 +70,7 @@ class Cut:
 class Cutter:
     """Cuts one grid by surfaces that move; `points` (n,) are the 1D points of the quadrature on cut cells.
 
-    unions: where bodies overlap, in 2D, the solid is their union. Else volumes are added up: bodies in contact overlap
+    unions: where bodies overlap, the solid is their union. Else volumes are added up: bodies in contact overlap
     by facets that do not match, and slivers of fluid beside a contact zone would come and go.
 
     Within a step a cell that the cut penalty has acted on keeps it. Otherwise iterates that alternate between two
@@ -102,7 +110,7 @@ class Cutter:
         self._first: _First | None = None
         self._of_step: Cut | None = None
         self._whole: Cut | None = None  #: without surfaces
-        self._overlaps: dict[int, Known] = {}  #: of the last cut
+        self._unions = Unions(grid.grid, points)
 
     def on_coarse_cells(self, layers: int) -> bool:
         """Whether a coarser cell is within some layers of those with cut penalty, among the cells of this process."""
@@ -158,7 +166,8 @@ class Cutter:
             self._special[:] = False  # a cell behind a thin body is one of its other side
         self._depth = max(self._depth, layers)
         nearby = _grow(self._own, self._depth + MARGIN)
-        x = in_planes(box, motion.x)
+        from_table = self.unions or grid.sheets is not None
+        x = without_slivers(box, facets, motion.x) if from_table else in_planes(box, motion.x)
         moments = kernels.moments(box.edges, self.points, x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])
@@ -168,11 +177,11 @@ class Cutter:
         if self._closing is not None:
             still = self._closed & (moments.fraction > 1.0 - SLIT) if self._steady else self._shut
             moments = filled(moments, self.points, still)
+        piece_normal = normal[moments.piece_facet]
         if self.unions:
-            moments = with_unions(box, self.points, moments, facets, x, off, self._tied, self._overlaps)
+            moments, piece_normal = self._unions(moments, facets, x, normal, self._tied)
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
-        piece_normal = normal[moments.piece_facet]
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
         touched = counts[moments.piece_facet] & (cells >= 0)
         is_cut, in_use = self._cut_cells(moments, cells, touched)
@@ -182,7 +191,7 @@ class Cutter:
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
         self._special |= is_cut | strip
-        touching = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
+        touching = solid & (self._facing(moments, counts, piece_normal) | self._covered(motion.x[facets[~off]]))
         if self._closing is not None:
             touching |= still
             self.closed = still.copy()
@@ -299,8 +308,7 @@ class Cutter:
         in_face = across >= 0
         number = np.concatenate([number, across[in_face]])
         area = np.concatenate([area, area[in_face]])
-        outward = normal[moments.piece_facet]
-        outward = np.concatenate([outward, outward[in_face]])
+        outward = np.concatenate([normal, normal[in_face]])
         total = np.bincount(number, area, size)
         net = np.stack([np.bincount(number, area * n, size) for n in outward.T])
         return (total > 0.0) & (np.linalg.norm(net, axis=0) < 0.5 * total)

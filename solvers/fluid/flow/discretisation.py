@@ -83,7 +83,7 @@ def discretise(
     # both sides of a thin body have cells in the same place, and a gap may be on one side alone
     gaps = GapFinder(wall_faces(patches), settings.penalties) if settings.with_gaps and sheets is None else None
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
-    unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
+    unions = sheets is None and len(bodies) > 1 and not in_contact
     cutter = Cutter(
         distributed,
         system.weights.points,

@@ -29,7 +29,7 @@ from solvers.fluid.flow.history import History
 from solvers.fluid.flow.moving_bodies import MovingBodies
 from solvers.fluid.flow.on_cells import FlowOnCells
 from solvers.fluid.flow.thin_bodies import Began
-from solvers.fluid.geometry.thin.sheet_parts import LAYERS_AROUND
+from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.grid.following import Following
 from solvers.fluid.mesh.distributed_grid import DistributedGrid

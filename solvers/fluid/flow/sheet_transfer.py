@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from solvers.api import Array, Indices
 from solvers.fluid.cut.extension import FREE_SHARE, LARGEST_FACTOR, continued, lagrange
-from solvers.fluid.geometry.thin.sheet_parts import LAYERS_AROUND, join
+from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND, join
 from solvers.fluid.geometry.thin.sheet_windows import neighbours_of
 from solvers.fluid.geometry.thin.sheets import Sheets
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, Indices
 from solvers.fluid.grid.box import Grid
-from solvers.mesh.gauss import gauss
 from solvers.mesh.lagrange import lagrange
 
 #: Distance from a plane of the grid, in cells, up to which a piece lies in it.
@@ -39,17 +38,35 @@ class Pieces:
         return sum(others, start=first)  # NumPy's sum over three neighbours takes five times as long
 
 
-def in_planes(grid: Grid, x: Array) -> Array:
-    """Vertices [m], those beside a plane of the grid by rounding put into it.
+def in_planes(grid: Grid, x: Array, share: float = 0.0) -> Array:
+    """Vertices [m], those beside a plane of the grid by rounding, or by a share of the larger cell at it, put into it.
 
     Then the kernel knows from the normal which of the two cells has the fluid.
     """
     placed = x.copy()
     for axis, edge in enumerate(grid.edges):
         above = np.clip(np.searchsorted(edge, x[:, axis]), 1, len(edge) - 1)
-        for plane in (edge[above - 1], edge[above]):
-            near = np.abs(x[:, axis] - plane) <= ROUNDING_OF_POSITION * np.abs(edge).max()
-            placed[near, axis] = plane[near]
+        size = np.diff(edge)
+        at_plane = np.maximum(np.append(size[:1], size), np.append(size, size[-1:]))
+        reach = np.maximum(ROUNDING_OF_POSITION * float(np.abs(edge).max()), share * at_plane)
+        for plane in (above - 1, above):
+            near = np.abs(x[:, axis] - edge[plane]) <= reach[plane]
+            placed[near, axis] = edge[plane[near]]
+    return placed
+
+
+def without_slivers(grid: Grid, facets: Indices, x: Array) -> Array:
+    """Vertices [m] without slivers of fluid between facets and planes of the grid that the cut takes for solid.
+
+    Those beside a plane by twice `NOTHING` are put into it: the mean of a wedge from the plane to there is `NOTHING`.
+    So are facets on the boundary of the box, see `off_boundary`.
+    """
+    placed = in_planes(grid, x, 2.0 * NOTHING)
+    for axis, edge in enumerate(grid.edges):
+        near = FLUSH * float(np.diff(edge).min())
+        for end in (edge[0], edge[-1]):
+            flush = (np.abs(x[facets, axis] - end) <= near).all(axis=1)
+            placed[facets[flush], axis] = end
     return placed
 
 
@@ -142,30 +159,3 @@ def place_of(grid: Grid, cells: Indices) -> tuple[Array, Array]:
         np.stack([edge[i + side] for edge, i in zip(grid.edges, index, strict=True)], axis=1) for side in (0, 1)
     )
     return low, high - low
-
-
-def parts_of_facets(
-    grid: Grid, cell: Indices, row: Indices, parts: Array, facets: Indices, x: Array, points: Array
-) -> Pieces:
-    """Pieces in cells of the box that are parts of facets, in 2D.
-
-    cell: number in the box of that of each part; row: among the cut cells; parts: (facet, begin, end) in reference
-    coordinates of the cell, shape (n, 5); x: vertices of the facets [m]; points: of the quadrature in one direction.
-    """
-    facet, ends = parts[:, 0].astype(np.int64), parts[:, 1:].reshape(-1, 2, 2)
-    low, size = place_of(grid, cell)
-    corners = (x[facets[facet]] - low[:, None]) / size[:, None]
-    nodes, weights = gauss(len(points) + 1)
-    along = ends[:, 1] - ends[:, 0]
-    at = ends[:, None, 0] + nodes[:, None] * along[:, None]
-    weight = np.linalg.norm(along * size, axis=1)[:, None] * weights
-    way = corners[:, 1] - corners[:, 0]
-    t = np.einsum("pgi,pi->pg", at - corners[:, None, 0], way) / (way**2).sum(axis=1)[:, None]
-    vertex = np.stack([1.0 - t, t], axis=2)
-    L = np.einsum("pga,pgb->pgba", lagrange(points, at[..., 0]), lagrange(points, at[..., 1]))
-    L = L.reshape(len(facet), len(nodes), len(points) ** 2)
-    moments = np.einsum("pgq,pgv,pg->pqv", L, vertex, weight)
-    mass = np.einsum("pgv,pgw,pg->pvw", vertex, vertex, weight)
-    tangent = way * size
-    normal = -np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
-    return Pieces(row, facet, moments, mass, normal)

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from solvers import fem
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
-from solvers.fluid.geometry.pieces import joined_pieces, parts_of_facets, selected
-from solvers.fluid.geometry.triangle_pieces import parts_of_triangles
+from solvers.cut_cells import CutTable
+from solvers.fluid.geometry.pieces import joined_pieces, selected
+from solvers.fluid.geometry.regions import pieces_of_regions
+from solvers.fluid.geometry.thin.fluid_parts import FluidParts
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.periodic import BEYOND_NODES, LatticeNodes
 from solvers.mesh.gauss import tensor_weights
@@ -50,27 +52,23 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     for number, of_cell in sheets.shares.items():
         if (cell := local[number]) >= 0 and (found := of_cell.integrals(points)) is not None:
             fluid[place[cell]], fraction[cell] = found / weights, of_cell.fraction
-    piece_box, target = grid.numbers[cut.cut[cut.pieces.cell]], np.full(len(cut.pieces.cell), -1)
-    for piece, (number, facet) in enumerate(zip(piece_box.tolist(), cut.pieces.facet.tolist(), strict=True)):
-        cells_there = sheets.successors.get(number)
-        if cells_there is None:
-            owner = number
+    table = sheets.parts.geometry.table(len(points))
+    rows_of = np.full(len(table.cell), -1)
+    owner = np.arange(box)
+    owner[list(sheets.successors)] = -1
+    for number, of_cell in sheets.shares.items():
+        if of_cell.regions:
+            rows_of[of_cell.regions] = place[local[number]] if local[number] >= 0 else -1
         else:
-            owner = next((c for c in cells_there if sheets.shares[c].has(facet)), None)
-        target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
-
-    touching = [
-        (place[cell], surface[counts[surface[:, 0].astype(int)]])
-        for number, of_cell in sheets.shares.items()
-        if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
-    ]
-    parts = [selected(cut.pieces, target)]
-    if touching:
-        row = np.repeat([row for row, _ in touching], [len(surface) for _, surface in touching])
-        surface = np.concatenate([surface for _, surface in touching])
-        parts_of = parts_of_facets if grid.dim == 2 else parts_of_triangles
-        there = grid.numbers[cells[row]]
-        parts.append(parts_of(grid.grid, there, row, surface, cut.facets, cut.motion.x, points))
+            owner[sheets.box_cells(np.array([number]))] = number
+    cell_of_piece = grid.numbers[cut.cut[cut.pieces.cell]]
+    target = owner[cell_of_piece]
+    target = np.where((target >= 0) & (local[target] >= 0), place[local[target]], -1)
+    region = _region_of_pieces(sheets.parts, table, cell_of_piece, cut.pieces.facet, counts)
+    target = np.where((target < 0) & (region >= 0), rows_of[region], target)
+    rows_of[np.isin(table.cell, cell_of_piece[region >= 0])] = -1
+    own = pieces_of_regions(table, points, grid.grid, cut.facets, cut.motion.x, rows_of)
+    parts = [selected(cut.pieces, target), selected(own, np.where(counts[own.facet], own.cell, -1))]
     return replace(
         cut,
         uncut=cut.uncut[~(empty | new)[cut.uncut]],
@@ -84,6 +82,30 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
         fraction=fraction,
         pieces=joined_pieces(parts),
     )
+
+
+def _region_of_pieces(
+    parts: FluidParts, table: CutTable, cell: Indices, facet: Indices, counts: NDArray[np.bool_]
+) -> Indices:
+    """Region that pieces of facets in cells of the box bound as a whole; -1: in this cell some facet does not.
+
+    Facets are divided where surfaces touch. All others meet with the same ends in two cells: what the table has of them
+    does so but for rounding errors over the sine of the angle to the planes of the grid, and no surface closes.
+    """
+    of_table = np.flatnonzero(counts[table.piece_facet])
+    keys = table.cell[table.piece_region[of_table]] * len(counts) + table.piece_facet[of_table]
+    wanted = cell * len(counts) + facet
+    order = np.argsort(keys, kind="stable")
+    of_table, keys = of_table[order], keys[order]
+    first, last = (np.searchsorted(keys, wanted, side=side) for side in ("left", "right"))
+    divided = np.zeros(len(table.state), dtype=bool)
+    divided[parts.touching] = divided[table.closed_cell] = True
+    divided[cell[last - first != 1]] = True
+    divided[table.cell[table.piece_region[of_table[~np.isin(keys, wanted)]]]] = True
+    found = np.full(len(cell), -1)
+    some = np.flatnonzero(~divided[cell])
+    found[some] = table.piece_region[of_table[first[some]]]
+    return found
 
 
 def _passable(

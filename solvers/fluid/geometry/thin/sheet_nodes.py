@@ -8,33 +8,35 @@ from itertools import product
 import numpy as np
 
 from solvers.algebra.connected import connected_parts
-from solvers.api import Indices, Mask
-from solvers.fluid.geometry.regions.regions import Region
+from solvers.api import Array, Indices, Mask
+from solvers.fluid.geometry.thin.fluid_parts import FluidParts
 from solvers.fluid.grid.box import Grid
 
 Joined = Mapping[int, frozenset[int]]  #: for cells of the box, facets whose parts of fluid are joined
 
 
-def same_nodes(parts: Sequence[Region], joined: Joined) -> list[tuple[int, int]]:
+def same_nodes(parts: FluidParts, joined: Joined) -> list[tuple[int, int]]:
     """Pairs of parts that are joined."""
-    first: dict[int, int] = {}
     found = []
-    for number, part in enumerate(parts):
-        if part.facets and joined.get(part.cell, frozenset()) & part.facets:
-            found.append((first.setdefault(part.cell, number), number))
-    return [(one, other) for one, other in found if one != other]
+    for cell, facets in joined.items():
+        here = range(*np.searchsorted(parts.cell, [cell, cell + 1]).tolist())
+        first, *others = [number for number in here if facets & parts.facets(number)] or [-1]
+        found += [(first, number) for number in others]
+    return found
 
 
 def node_copies(
     grid: Grid,
-    parts: Sequence[Region],
+    cells: Indices,
+    share: Array,
     links: Indices,
     same: Sequence[tuple[int, int]],
     special: Mask,
 ) -> Indices:
     """Number of the copy that each node of a part's cell is, in the lattice of second degree, shape (parts, nodes).
 
-    links: (part, part of the next cell, axis); same: pairs of parts of a cell with the same nodes.
+    cells, share: of the parts, and their volumes as shares of these; links: (part, part of the next cell, axis); same:
+    pairs of parts of a cell with the same nodes.
     Among the parts around a node, those with the most fluid keep the node of the box, copy 0.
     """
     steps = np.array(list(product(range(3), repeat=grid.dim)))[:, ::-1]  # the first direction fastest
@@ -47,12 +49,11 @@ def node_copies(
         upper, lower = (np.flatnonzero(steps[:, axis] == at) for at in (2, 0))
         first.append((a[:, None] * size + upper).ravel())
         second.append((b[:, None] * size + lower).ravel())
-    group = connected_parts(np.concatenate(first), np.concatenate(second), len(parts) * size)
-    cells = np.array([part.cell for part in parts], dtype=np.int64)
+    group = connected_parts(np.concatenate(first), np.concatenate(second), len(cells) * size)
     index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
     counts = [2 * n + 1 for n in grid.shape]
     node = np.ravel_multi_index(tuple(np.moveaxis(2 * index[:, None] + steps, 2, 0)), counts, order="F").ravel()
-    fluid = np.bincount(group, np.repeat([part.share for part in parts], size), len(group))
+    fluid = np.bincount(group, np.repeat(share, size), len(group))
     groups = np.unique(group)
     order = groups[np.lexsort((groups, -fluid[groups], node[groups]))]
     starts = np.flatnonzero(np.diff(node[order], prepend=-1))

@@ -22,12 +22,11 @@ from scipy.spatial import cKDTree
 from solvers import kernels
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices, Mask
-from solvers.fluid.geometry.pieces import in_planes, off_boundary
-from solvers.fluid.geometry.regions.sliced_facets import ragged
-from solvers.fluid.geometry.regions.space_parts import parts_in_space
+from solvers.fluid.geometry.bodies import closed_surfaces
+from solvers.fluid.geometry.pieces import off_boundary, without_slivers
 from solvers.fluid.geometry.thin.closing import are_apart, closed_at, may_touch, uncut_cells
+from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND, FluidParts, grown, parts_of_fluid, ragged
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, node_copies, same_nodes
-from solvers.fluid.geometry.thin.sheet_parts import LAYERS_AROUND, Part, facing_of, grown, links_of, parts_of_fluid
 from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
 from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin
 from solvers.fluid.geometry.tied_slits import slivers_of, without_slits
@@ -44,35 +43,32 @@ CELL_DIAGONAL = 3.0**0.5
 
 @dataclass(frozen=True)
 class FluidShare:
-    """The regions of fluid in a cell of the box that one cell of the mesh has, if it does not have all."""
+    """The parts of fluid in a cell of the box that one cell of the mesh has, if it does not have all."""
 
-    regions: tuple[Part, ...]
+    parts: FluidParts
+    numbers: tuple[int, ...]
 
     @property
     def fraction(self) -> float:
-        return sum(region.share for region in self.regions)
+        return float(self.parts.share[list(self.numbers)].sum())
+
+    @property
+    def regions(self) -> list[int]:
+        """In the table; empty if the cell has all of the fluid."""
+        found = self.parts.region[list(self.numbers)].tolist()
+        return [] if min(found) < 0 else found
 
     def integrals(self, points: Array) -> Array | None:
         """int L_q over the fluid, relative to the cell; None if the cell has all of the fluid."""
-        if any(region.facets is None for region in self.regions):
+        if not self.regions:
             return None
-        return np.asarray(sum(region.integrals(points) for region in self.regions))
+        return np.asarray(sum(self.parts.integrals(part, points) for part in self.numbers))
 
-    @property
-    def surface(self) -> Array | None:
-        """Parts of facets that bound the regions, as in `Region`; None: whole facets."""
-        found = [region.surface for region in self.regions if region.surface is not None]
-        return np.concatenate(found) if found else None
-
-    def has(self, facet: int) -> bool:
-        """Whether the facet bounds this fluid, with all of it that is in the cell."""
-        return any(
-            region.facets is None or (region.surface is None and facet in region.facets) for region in self.regions
-        )
-
-    def wet(self, axis: int, side: int, points: Array) -> Array:
-        """int L_q over the wet part of a face, relative to the face."""
-        return np.asarray(sum(region.wet(axis, side, points) for region in self.regions))
+    def wet(self, axis: int, side: int, points: Array) -> Array | None:
+        """int L_q over the open part of a face, relative to the face; None if the cell has all of the fluid."""
+        if not self.regions:
+            return None
+        return np.asarray(sum(self.parts.wet(part, axis, side, points) for part in self.numbers))
 
 
 @dataclass(frozen=True)
@@ -91,6 +87,8 @@ class Sheets:
     links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
     fluid: Array  #: share of fluid in each cell of the mesh
     bounds: Indices  #: (cell of the mesh, facet that bounds its fluid), shape (n, 2)
+    touching: Indices  #: cells of the box with fluid in which bodies touch, sorted
+    parts: FluidParts
     #: cells of the box in which bodies touched when the step began, sorted
     closed: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
@@ -118,17 +116,13 @@ class Sheets:
             found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(cell)
         return found
 
-    @cached_property
-    def touching(self) -> Indices:
-        """Cells of the box with fluid in which bodies touch."""
-        cells = [cell for cell, share in self.shares.items() if share.surface is not None]
-        return np.unique(self.box_cells(np.array(cells, dtype=np.int64)))
-
     def cell_at(self, cell: int, x: Array) -> int:
         """Cell of the mesh that has the fluid at x, given in the reference coordinates of a cell of the box."""
         there = self.successors.get(cell) or [cell]
-        regions = ((c, region) for c in there if c in self.shares for region in self.shares[c].regions)
-        return next((c for c, region in regions if region.contains(x)), there[0])
+        if len(there) == 1:
+            return there[0]
+        region = self.parts.region_at(cell, x)
+        return next((c for c in there if region in self.shares[c].regions), there[0])
 
     def mesh(self) -> Mesh:
         """Mesh of the box and of the new cells, which are not connected to others, except pairs to each other."""
@@ -249,57 +243,59 @@ def find_sheets(
     may_part = always or (thin > 0 and (grid.dim == 2 or may_be_thin(grid, facets, x, CELL_DIAGONAL * (thin + 1))))
     if not (may_part or may_close):
         return None
-    x = in_planes(grid, x)
+    x = without_slivers(grid, facets, x)
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     may_close &= are_apart(grid, uncut_cells(grid, moments))
     if not (may_part or may_close):
         return None
+    if (surfaces := closed_surfaces(facets, x)) is None:
+        return None
     if tied is not None:
         moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
-    parts, links, special, touching = _all_parts(grid, moments, facets, x, bounds)
-    if not parts and not always:  # all surfaces are outside of the box
+    parts = parts_of_fluid(grid, moments, surfaces, x)
+    cells, links, special = parts.cell, parts.links, parts.special
+    if not len(cells) and not always:  # all surfaces are outside of the box
         return None
-    cells = np.array([part.cell for part in parts], dtype=np.int64)
     if not always:
-        close, facing = np.flatnonzero(grown(grid, special, 1)[cells]), facing_of(parts, x[facets])
+        close, facing = np.flatnonzero(grown(grid, special, 1)[cells]), parts.facing()
         if grid.dim == 3:
             close = _opposed(grid, cells, facing, close, thin)
-        if not (may_part and _is_thin(grid, parts, links, facing, close, thin)) and not (
+        if not (may_part and _is_thin(grid, cells, links, facing, close, thin)) and not (
             may_close and len(closed_at(grid, moments, cells, links))
         ):
             return None
-    copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
+    copies = node_copies(grid, cells, parts.share, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)
-    linked = np.zeros(len(parts), dtype=bool)
+    linked = np.zeros(len(cells), dtype=bool)
     linked[links[:, :2]] = True
     new = np.flatnonzero(moved & linked)  # fluid that is enclosed within one cell counts as solid
-    by_cell: dict[int, list[int]] = {}
-    for number, part in enumerate(parts):
-        by_cell.setdefault(part.cell, []).append(number)
-    shares = {grid.size + k: FluidShare((parts[n],)) for k, n in enumerate(new)}
-    staying = {cell: [n for n in numbers if not moved[n]] for cell, numbers in by_cell.items()}
-    staying |= {cell: [] for cell in touching.tolist() if cell not in by_cell}
-    some = {cell for cell, kept in staying.items() if len(kept) < len(by_cell.get(cell, []))} | set(touching.tolist())
-    shares |= {
-        cell: FluidShare(tuple(parts[n] for n in kept)) for cell, kept in staying.items() if kept and cell in some
-    }
+    shares = {grid.size + k: FluidShare(parts, (n,)) for k, n in enumerate(new.tolist())}
+    touching = np.zeros(grid.size, dtype=bool)
+    touching[parts.touching] = True
+    sharing = touching.copy()
+    sharing[cells[moved]] = True
+    staying: dict[int, list[int]] = {cell: [] for cell in np.flatnonzero(sharing).tolist()}
+    for number in np.flatnonzero(sharing[cells] & ~moved).tolist():
+        staying[int(cells[number])].append(number)
+    shares |= {cell: FluidShare(parts, tuple(kept)) for cell, kept in staying.items() if kept}
+    left = np.array([cell for cell, kept in staying.items() if not kept], dtype=np.int64)
     cell_of = np.where(moved, -1, cells)
     cell_of[new] = grid.size + np.arange(len(new))
     ends = links[:, :2]
     linked_cells, changed = cell_of[ends], moved[ends].any(axis=1)
     passing = set(map(tuple, cells[ends[~changed]].tolist()))
-    adjacent = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
+    adjacent = _neighbours(grid, np.unique(cells[~moved]))
     at_faces = ends[changed & special[cells[ends]].any(axis=1)]
     fluid = np.concatenate([np.clip(1.0 - moments.fraction, 0.0, 1.0), np.zeros(len(new) + 2 * len(at_faces))])
-    fluid[sorted(some)] = 0.0
+    fluid[sharing.nonzero()] = 0.0
     for number, share in shares.items():
         fluid[number] = share.fraction
-    bounding = [(cell_of[n], facet) for n, part in enumerate(parts) if cell_of[n] >= 0 for facet in part.facets or ()]
+    part, facet = parts.pieces.T
     members = np.concatenate([new, at_faces.ravel()])
     return Sheets(
         grid,
         shares,
-        np.array(sorted(cell for cell, kept in staying.items() if not kept), dtype=np.int64),
+        left,
         frozenset(adjacent - passing),
         cells[members],
         len(at_faces),
@@ -307,16 +303,10 @@ def find_sheets(
         grown(grid, special, LAYERS_AROUND),
         np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
         fluid,
-        np.array(bounding, dtype=np.int64).reshape(-1, 2),
+        np.column_stack([cell_of[part], facet])[cell_of[part] >= 0],
+        np.intersect1d(parts.touching, cells),
+        parts,
     )
-
-
-def _all_parts(grid: Grid, moments, facets: Indices, x: Array, bounds: Mask):
-    """(parts of fluid, their links, mask of special cells, cells in which bodies touch) of `find_sheets`."""
-    if grid.dim == 3:
-        return parts_in_space(grid, moments, facets, x, LAYERS_AROUND)
-    parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
-    return parts, links_of(grid, parts), special, touching
 
 
 def closed_way(grid: Grid, facets: Indices, x: Array) -> Array:
@@ -326,12 +316,14 @@ def closed_way(grid: Grid, facets: Indices, x: Array) -> Array:
     """
     if not len(facets) or not may_touch(grid, facets, x):
         return np.empty((0, grid.dim))
-    bounds, x = off_boundary(grid, x[facets]), in_planes(grid, x)
+    x = without_slivers(grid, facets, x)
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     if not are_apart(grid, uncut_cells(grid, moments)):
         return np.empty((0, grid.dim))
-    parts, links, _, _ = _all_parts(grid, moments, facets, x, bounds)
-    return closed_at(grid, moments, np.array([part.cell for part in parts], dtype=np.int64), links)
+    if (surfaces := closed_surfaces(facets, x)) is None:
+        return np.empty((0, grid.dim))
+    parts = parts_of_fluid(grid, moments, surfaces, x)
+    return closed_at(grid, moments, parts.cell, parts.links)
 
 
 def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
@@ -343,22 +335,22 @@ def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: in
     return np.unique(close[pairs][(facing[first] * facing[second]).sum(axis=1) < OPPOSITE_NORMALS])
 
 
-def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, close: Indices, thin: int) -> bool:
+def _is_thin(grid: Grid, cells: Indices, links: Indices, facing: Array, close: Indices, thin: int) -> bool:
     """Whether a thin body is between two parts: they face opposite directions and are not linked nearby.
 
     Parts around a corner of a thick body do not face opposite directions, or are linked around it.
-    facing: mean normal of the surface in each part, nan where there is none; close: parts to test; thin: their largest
-    distance [cells].
+    cells: of the parts; facing: mean normal of the surface in each, nan where there is none; close: parts to test;
+    thin: their largest distance [cells].
     """
-    index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
+    index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
     ends = links[:, :2]
-    linked = np.zeros(len(parts), dtype=bool)
+    linked = np.zeros(len(cells), dtype=bool)
     linked[ends.ravel()] = True
     some = close[linked[close]]
     around = cKDTree(index).query_ball_point(index[some], thin + AROUND_PAIR, p=np.inf, return_sorted=True)
     ends = ends[np.argsort(ends[:, 0], kind="stable")]
-    begins = np.searchsorted(ends[:, 0], np.arange(len(parts) + 1))
-    number = np.full(len(parts), -1)
+    begins = np.searchsorted(ends[:, 0], np.arange(len(cells) + 1))
+    number = np.full(len(cells), -1)
     for part, near in zip(some, map(np.array, around), strict=True):
         number[near] = np.arange(len(near))
         first, place = ragged(begins[near + 1] - begins[near])
@@ -372,13 +364,13 @@ def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, c
     return False
 
 
-def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:
+def _neighbours(grid: Grid, cells: Indices) -> set[tuple[int, int]]:
     """Pairs of these cells with a common face, the lower first."""
-    members, found = set(cells), set()
-    index = np.stack(np.unravel_index(np.array(cells, dtype=np.int64), grid.shape, order="F"), axis=1)
+    found: set[tuple[int, int]] = set()
+    index, members = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1), set(cells.tolist())
     for axis, count in enumerate(grid.shape):
         stride = int(np.prod(grid.shape[:axis]))
-        found |= {(c, c + stride) for c, i in zip(cells, index[:, axis], strict=True) if i + 1 < count}
+        found |= {(c, c + stride) for c, i in zip(cells.tolist(), index[:, axis], strict=True) if i + 1 < count}
     return {pair for pair in found if pair[1] in members}
 
 

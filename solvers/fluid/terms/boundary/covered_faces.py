@@ -136,7 +136,8 @@ def _covered(
     wet = found.weights[row_of[number[touched]]]
     if grid.sheets is not None:
         for row, cell in enumerate(grid.original[cells[touched]].tolist()):
-            if cell in grid.sheets.shares:
-                wet[row] = grid.sheets.shares[cell].wet(axis, side, points)
+            share = grid.sheets.shares.get(cell)
+            if share is not None and (found_wet := share.wet(axis, side, points)) is not None:
+                wet[row] = found_wet
     weights = wet * areas[:, None]
     return CoveredFaces(grid, unknowns, cells[touched], axis, side, reference, weights), touched

@@ -17,9 +17,13 @@ from solvers.api import Array
 from solvers.fluid.geometry.pieces import FLUSH
 from solvers.fluid.grid.box import Grid
 from solvers.mesh.gauss import gauss
+from solvers.mesh.tessellation import unit_normals
 
 #: Gauss points on a line: exact for a basis of degree 4 in two directions and barycentric coordinates.
 ON_LINE = 5
+
+#: Difference of unit normals that is rounding error.
+SAME_NORMAL = 1e-9
 
 
 def open_sides(grid: Grid, number: NDArray[np.int64], creeping: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -48,6 +52,7 @@ def crossing_moments(
 
     x: corners of the facets, (pieces, dim, dim); n: unit normals; origin, sizes: of the cells, (pieces, dim);
     reference: points of L_q, (points, dim); sides: planes that count, (pieces, dim, 2).
+    Pieces with another normal than their facet cross no planes: ends of what is closed lie in planes themselves.
     """
     pieces, dim = n.shape
     nodes = gauss(len(np.unique(reference[:, 0].round(12))))[0]
@@ -55,9 +60,12 @@ def crossing_moments(
     found = np.zeros((pieces, dim, len(reference), dim))
     t, weights = gauss(ON_LINE) if dim == 3 else (np.zeros(1), np.ones(1))
     local = (x - origin[:, None]) / sizes[:, None]
+    facing = unit_normals(x)
+    facing *= np.sign((n * facing).sum(axis=1))[:, None]
+    own = np.abs(n - facing).max(axis=1, initial=0.0) < SAME_NORMAL
     for axis in range(dim):
         for side in (0, 1):
-            some, ends = _line(local[:, :, axis] - side, sides[:, axis, side])
+            some, ends = _line(local[:, :, axis] - side, own & sides[:, axis, side])
             # barycentric coordinates of both ends, and the part of the line between them that is in the cell
             first, last = _inside(ends, local[some], axis)
             kept = last > first

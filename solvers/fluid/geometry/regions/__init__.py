@@ -1,1 +1,0 @@
-"""Regions into which surfaces divide a cell, its faces and edges."""
