@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from fsci.plot.frames import Moment, draw_frames
@@ -90,9 +91,13 @@ def write_mp4(path: Path, frames: Sequence[Pixels], encoder: str) -> Path:
         "-",
     ]
     even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
-    with replacing(path) as unfinished:
+    with TemporaryFile() as pixels, replacing(path) as unfinished:
+        # not a pipe: where PETSc is loaded, a program that does not read one to its end would end this process
+        for frame in frames:
+            pixels.write(frame.tobytes())
+        pixels.seek(0)
         program = [encoder, "-loglevel", "error", "-y", *given, *even, "-f", "mp4", str(unfinished)]
-        done = subprocess.run(program, input=b"".join(pixels.tobytes() for pixels in frames), capture_output=True)
+        done = subprocess.run(program, stdin=pixels, capture_output=True)
         if done.returncode:
             raise RuntimeError(f"{encoder} cannot write a movie: {done.stderr.decode(errors='replace').strip()}")
     return path

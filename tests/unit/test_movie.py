@@ -3,6 +3,7 @@
 import math
 import stat
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -79,9 +80,11 @@ def test_gif_alone_without_an_encoder(moments, tmp_path, monkeypatch):
 
 
 def test_what_the_encoder_says(tmp_path):
+    """It does not read its input. PETSc, where it is loaded, ends a process that writes to such a program."""
+    import_module("petsc4py.PETSc")
     encoder = program(tmp_path / "ffmpeg", REFUSES)
     with pytest.raises(RuntimeError, match=r"ffmpeg cannot write a movie: no such codec$"):
-        write_mp4(tmp_path / "movie.mp4", [np.zeros((3, 5, 3), dtype=np.uint8)], encoder)
+        write_mp4(tmp_path / "movie.mp4", [np.zeros((600, 960, 3), dtype=np.uint8)], encoder)
     assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
 
 

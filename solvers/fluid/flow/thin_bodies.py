@@ -16,7 +16,7 @@ from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.geometry.pieces import off_boundary
-from solvers.fluid.geometry.thin.sheet_cycles import joined_in, recurring
+from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined_in, recurring
 from solvers.fluid.geometry.thin.sheets import Sheets, closed_way, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
@@ -69,7 +69,8 @@ class ThinBodies:
         self._x: Array | None = None
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
         self._closed: NDArray[np.int64] | None = None  #: `Sheets.closed` of this step; None: it has no sheets yet
-        self._tried: list[Sheets] = []  #: sheets of this step, in their order
+        self._first: Sheets | None = None  #: sheets at the start of this step
+        self._tried: list[Sheets] = []  #: sheets of the iterates of this step, in their order
         self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
 
     @property
@@ -92,12 +93,14 @@ class ThinBodies:
             return self._sheets
         if self._x is None or not np.array_equal(self._x, motion.x):
             found = self._find(facets, motion.x)
-            if found is not None and self._join(joined_in(recurring(self._tried, found))):
+            if found is not None and self._join_parts(found):
                 found = self._find(facets, motion.x)
             if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
                 self._tried.append(found)
             self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
         if self._sheets is not None:
+            if self._first is None:
+                self._first = self._sheets
             if self._closed is None:
                 self._closed = self._sheets.touching
             if not np.array_equal(self._sheets.closed, self._closed):
@@ -141,15 +144,20 @@ class ThinBodies:
         faces = [name for name, near_it in zip(FACES, away <= np.repeat(size, 2), strict=False) if near_it]
         return (*(f"'{name}'" for name in bodies), *(f"face {name}" for name in faces))
 
-    def _join(self, parts: dict[int, frozenset[int]]) -> bool:
-        """Keep parts joined until the step ends; returns whether some are new."""
-        before = self._joined
-        self._joined = before | {cell: before.get(cell, frozenset()) | some for cell, some in parts.items()}
+    def _join_parts(self, now: Sheets) -> bool:
+        """Keep parts joined until the step ends that these sheets divide in vain; returns whether some are new."""
+        before, earlier = dict(self._joined), [] if self._first is None else [self._first]
+        for parts in (
+            joined_in(recurring(self._tried, now)),
+            divided_by_touching([*earlier, *self._tried], now),
+        ):
+            for cell, facets in parts.items():
+                self._joined[cell] = self._joined.get(cell, frozenset()) | facets
         return self._joined != before
 
     def begin_step(self) -> None:
         """Forget the sheets of the last step, and search once for thin bodies if there has been none."""
-        self._tried, self._searched, self._closed = [], False, None
+        self._first, self._tried, self._searched, self._closed = None, [], False, None
         if self._joined:
             self._joined, self._x = {}, None
 

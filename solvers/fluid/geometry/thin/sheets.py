@@ -116,6 +116,17 @@ class Sheets:
             found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(cell)
         return found
 
+    @cached_property
+    def facets_of_parts(self) -> dict[int, list[set[int]]]:
+        """For each cell of the box, the facets of each cell of the mesh in its place."""
+        of_cell: dict[int, set[int]] = {}
+        for cell, facet in self.bounds.tolist():
+            of_cell.setdefault(cell, set()).add(facet)
+        found: dict[int, list[set[int]]] = {}
+        for cell, facets in of_cell.items():
+            found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(facets)
+        return found
+
     def cell_at(self, cell: int, x: Array) -> int:
         """Cell of the mesh that has the fluid at x, given in the reference coordinates of a cell of the box."""
         there = self.successors.get(cell) or [cell]
