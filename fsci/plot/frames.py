@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from fsci.plot.render import DrawnBody, Pixels
 from fsci.plot.render_flow import load_state
@@ -49,11 +50,10 @@ def _states(moments: Sequence[Moment], field: str) -> Iterator[tuple[float, list
 
 def _start(work: tuple[Scene, Sequence[Moment], str, int]) -> subprocess.Popen[bytes]:
     program = [sys.executable, "-c", f"from {__name__} import answer; answer()"]
-    worker = subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    assert worker.stdin is not None
-    pickle.dump(work, worker.stdin)
-    worker.stdin.flush()
-    return worker
+    with TemporaryFile() as given:  # not a pipe, as in `write_mp4`
+        pickle.dump(work, given)
+        given.seek(0)
+        return subprocess.Popen(program, stdin=given, stdout=subprocess.PIPE)
 
 
 def _next(worker: subprocess.Popen[bytes]) -> Pixels:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_picture import SI, bent_beam
 
-from fsci.plot import frames, movie
+from fsci.plot import movie
 from fsci.plot.frames import draw_frames
 from fsci.plot.movie import find_encoder, plot_movie, write_mp4
 from fsci.plot.render_flow import load_state
@@ -56,7 +56,6 @@ def test_two_processes_draw_what_one_does(moments, scene):
 
 def test_a_process_that_ends_is_said(moments, scene, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    monkeypatch.setattr(frames.pickle, "dump", lambda *_: None)
     with pytest.raises(RuntimeError, match=r"^a process that draws the movie ended with exit code 1$"):
         list(draw_frames(scene, moments, "displacement", 60, processes=2))
 
