@@ -61,8 +61,9 @@ class Viscosity:
             for E, row in zip(map(ufl.as_matrix, (axis.tolist() for axis in axes)), self._compliance, strict=True):
                 wanted.append(-power(E * of_v, of_w, spin) - power(of_v, E * of_w, spin))
                 wanted.append(q * sum(entry * a for entry, a in zip(row, axial, strict=True)) * at_middle)
-        self._force, self._matrix, *turning = fem.compile_forms(wanted, f"damping of body '{body.name}'")
-        self._turning = [(turning[k], turning[k + 1]) for k in range(1, len(turning), 2)]
+        self._force, matrix, *turning = fem.compile_forms(wanted, f"damping of body '{body.name}'")
+        self._matrix = _Assembled(matrix)
+        self._turning = [_Turning(turning[k], turning[k + 1]) for k in range(1, len(turning), 2)]
         self._sizes = np.zeros(0)
         if turning:
             sizes = fem.function(scalars)
@@ -100,38 +101,58 @@ class Viscosity:
         return found if self._springs is None else found + self._springs.force(v)
 
     def matrix(self) -> PETSc.Mat:
-        """Derivative of f by the velocity (collective)."""
+        """Derivative of f by the velocity, until the next call (collective)."""
         self._turn()
-        matrix = _assembled(self._matrix)
+        matrix = self._matrix.assemble()
         if self._springs is not None:
             matrix.axpy(1.0, self._springs.matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         return matrix
 
     def turning(self, v: Array) -> PETSc.Mat:
-        """Derivative of f by the displacement, which turns the cells; zero for small displacements (collective)."""
+        """Derivative of f by the displacement, which turns the cells, until the next call (collective).
+
+        It is zero for small displacements.
+        """
         if not self._turning:
-            nothing = _assembled(self._matrix)
+            nothing = self._matrix.assemble()
             nothing.zeroEntries()
             return nothing
         self._set(v)
-        products = []
-        for by_spin, spin in self._turning:
-            rotations = _assembled(spin)
-            scale = rotations.createVecLeft()
-            scale.array[:] = 1.0 / self._sizes
-            rotations.diagonalScale(scale, None)
-            products.append(_assembled(by_spin).matMult(rotations))
-        total = products[0]
-        for product in products[1:]:
+        total, *others = (turning.assemble(self._sizes) for turning in self._turning)
+        for product in others:
             total.axpy(1.0, product, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return total
 
 
-def _assembled(form: Any) -> PETSc.Mat:
-    matrix = fem.create_matrix(form)
-    fem.assemble_matrix(matrix, form)
-    matrix.assemble()
-    return matrix
+class _Assembled:
+    """The matrix of a bilinear form. Its pattern is made once."""
+
+    def __init__(self, form: Any):
+        self._form, self._matrix = form, fem.create_matrix(form)
+
+    def assemble(self) -> PETSc.Mat:
+        """The matrix, until the next call (collective)."""
+        self._matrix.zeroEntries()
+        fem.assemble_matrix(self._matrix, self._form)
+        self._matrix.assemble()
+        return self._matrix
+
+
+class _Turning:
+    """Derivative of f by the displacement through the rotations about one axis."""
+
+    def __init__(self, by_spin: Any, spin: Any):
+        self._by_spin, self._spin = _Assembled(by_spin), _Assembled(spin)
+        self._product: PETSc.Mat | None = None
+
+    def assemble(self, sizes: Array) -> PETSc.Mat:
+        """(df / d spin) (d spin / du), until the next call; `sizes` of the cells (collective)."""
+        spins = self._spin.assemble()
+        scale = spins.createVecLeft()
+        scale.array[:] = 1.0 / sizes
+        spins.diagonalScale(scale, None)
+        self._product = self._by_spin.assemble().matMult(spins, self._product)
+        return self._product
 
 
 def _axes(dim: int) -> list[Array]:
