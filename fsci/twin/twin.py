@@ -18,7 +18,7 @@ from fsci.running.summary import plain
 from fsci.running.verify import evaluate
 from fsci.running.warm import WarmProcess
 from fsci.twin.changes import Meaning, Twin, quick, twins
-from fsci.twin.compare import TwinChange, Value, changes, values
+from fsci.twin.compare import ROUNDING, TwinChange, Value, changes, units, values
 from fsci.twin.grids import NO_FIELDS, Settings
 from fsci.twin.runs import TwinEnded, known_runs, run_all
 
@@ -26,8 +26,6 @@ TWIN_RESULTS = "twin.json"
 BASE = Twin("case", "the case itself", "defect")
 #: Difference, relative to the largest value of a probe, that the tolerance of solvers explains.
 AGREEMENT = 1e-6
-#: That of the same equations in other coordinates, which rounding explains: solvers stop at the same iterate.
-ROUNDING = 1e-8
 
 #: What a twin says that changes a value by more than AGREEMENT.
 SAYINGS: dict[Meaning, str] = {
@@ -59,10 +57,10 @@ def run_twins(
             ended[one.twin.name] = one
             known[one.twin.name] = one.checksum
             say(_progress(one))
-            write_text(out / TWIN_RESULTS, json.dumps(plain(_results(runs, ended, known)), indent=1) + "\n")
+            write_text(out / TWIN_RESULTS, json.dumps(plain(_results(case, runs, ended, known)), indent=1) + "\n")
             if one.twin is BASE and one.message:
                 return False
-    say("\n" + "\n".join(_table(runs, ended)))
+    say("\n" + "\n".join(_table(case, runs, ended)))
     return not any(one.message for one in ended.values())
 
 
@@ -96,23 +94,26 @@ def _progress(one: TwinEnded) -> str:
 
 
 def _compared(
-    runs: Sequence[Twin], ended: Mapping[str, TwinEnded]
+    case: Case, runs: Sequence[Twin], ended: Mapping[str, TwinEnded]
 ) -> tuple[dict[str, Value], dict[str, dict[str, TwinChange]]]:
     """Values of the case itself, and what each twin changes of them."""
     base = ended.get(BASE.name)
     if base is None or base.message:
         return {}, {}
-    own = values(base.history, base.summary)
+    unit = units(case)
+    own = values(base.history, base.summary, unit)
     found = {}
     for twin in runs[1:]:
         one = ended.get(twin.name)
         if one is not None and not one.message:
-            found[twin.name] = changes(own, values(one.history, one.summary, twin.opposite))
+            found[twin.name] = changes(own, values(one.history, one.summary, unit, twin.opposite))
     return own, found
 
 
-def _results(runs: Sequence[Twin], ended: Mapping[str, TwinEnded], known: Mapping[str, str]) -> dict[str, Any]:
-    own, found = _compared(runs, ended)
+def _results(
+    case: Case, runs: Sequence[Twin], ended: Mapping[str, TwinEnded], known: Mapping[str, str]
+) -> dict[str, Any]:
+    own, found = _compared(case, runs, ended)
     return {
         "checksums": known,
         "runs": {
@@ -137,9 +138,9 @@ def _results(runs: Sequence[Twin], ended: Mapping[str, TwinEnded], known: Mappin
     }
 
 
-def _table(runs: Sequence[Twin], ended: Mapping[str, TwinEnded]) -> list[str]:
+def _table(case: Case, runs: Sequence[Twin], ended: Mapping[str, TwinEnded]) -> list[str]:
     """Values by twins, then a sentence on each twin."""
-    own, found = _compared(runs, ended)
+    own, found = _compared(case, runs, ended)
     kinds: dict[str, list[Twin]] = {}
     for twin in runs[1:]:
         if twin.name in found:

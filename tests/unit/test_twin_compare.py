@@ -21,6 +21,21 @@ def test_a_small_component_is_compared_with_the_vector():
     assert found["u.x"].value == 0.0
 
 
+def test_what_is_zero_but_for_rounding():
+    """A column whose whole probe is rounding is compared with the others of its unit; one without a unit is not."""
+
+    def zero(noise):
+        history = {"time": TIME, "at_rest": noise + 0.0 * TIME, "speed": 2.0 + 0.0 * TIME, "mass": noise + 0.0 * TIME}
+        speed = (1, 0, -1)
+        return values(
+            history, {"probes": dict.fromkeys(history)}, {"at_rest": speed, "speed": speed, "mass": (0, 1, 0)}
+        )
+
+    found = changes(zero(1e-17), zero(3e-17))
+    assert found["at_rest"].curve == pytest.approx(1e-9)
+    assert found["mass"].curve == pytest.approx(2.0 / 3.0)
+
+
 def test_the_largest_difference_over_time():
     found = changes(values(*run(TIME)), values(*run(TIME + np.array([0.0, 0.4, 0.0, 0.1]))))
     assert found["u.x"].value == pytest.approx(0.1 / 4.1)
