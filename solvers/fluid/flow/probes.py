@@ -74,8 +74,14 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
 
 def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
     """(dofs (n, components), shape functions (n,)) of the owned nodes whose cell has the point x [m]."""
-    if (nested := fluid.grid.nested) is not None:
-        return _of_nodes(nodes, *_in_nested(nested, degree, x))
+    nested, sheets = fluid.grid.nested, fluid.grid.sheets
+    if nested is not None:
+        cell, numbers, weights = _in_nested(nested, degree, x)
+        if sheets is not None and nested.width[cell] == 1:
+            low, high = nested.bounds(np.array([cell]))
+            there = sheets.cell_at(int(nested.first[cell]), ((x - low) / (high - low))[0])
+            numbers = sheets.nodes(np.array([there]), degree, _node_steps(degree, fluid.dim))[0]
+        return _of_nodes(nodes, numbers, weights)
     number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
     indices: list[int] = []
     reference: list[float] = []
@@ -90,23 +96,29 @@ def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tupl
         stride *= count
         indices.append(cell)
         reference.append(s)
-    if (sheets := fluid.grid.sheets) is not None:
-        steps = np.indices((degree + 1,) * fluid.dim).reshape(fluid.dim, -1)[::-1].T  # the first direction fastest
+    if sheets is not None:
         box = int(np.ravel_multi_index(indices, fluid.grid.grid.shape, order="F"))
-        number = sheets.nodes(np.array([sheets.cell_at(box, np.array(reference))]), degree, steps)[0]
+        there = sheets.cell_at(box, np.array(reference))
+        number = sheets.nodes(np.array([there]), degree, _node_steps(degree, fluid.dim))[0]
     return _of_nodes(nodes, number, weight)
 
 
-def _in_nested(grid: Nested, degree: int, x: Array) -> tuple[np.ndarray, Array]:
-    """(numbers of the nodes, shape functions) of the nested cell at a point."""
+def _node_steps(degree: int, dim: int) -> np.ndarray:
+    """Steps from the first node of a cell to each, the first direction fastest, shape (nodes, dim)."""
+    return np.indices((degree + 1,) * dim).reshape(dim, -1)[::-1].T
+
+
+def _in_nested(grid: Nested, degree: int, x: Array) -> tuple[int, np.ndarray, Array]:
+    """(the nested cell at a point, numbers of its nodes, their shape functions), the first direction fastest."""
     index = [
         int(np.clip(np.searchsorted(edge, at) - 1, 0, len(edge) - 2)) for edge, at in zip(grid.edges, x, strict=True)
     ]
     cell = grid.cell_of[[np.ravel_multi_index(index, grid.shape, order="F")]].astype(np.int64)
     low, high = grid.bounds(cell)
     along = lagrange(np.arange(degree + 1) / degree, ((x - low) / (high - low))[0])
-    steps = np.indices((degree + 1,) * grid.dim).reshape(grid.dim, -1)
-    return grid.nodes(cell, degree, steps.T)[0], np.prod(np.take_along_axis(along, steps, axis=1), axis=0)
+    steps = _node_steps(degree, grid.dim)
+    shapes = np.prod(np.take_along_axis(along, steps.T, axis=1), axis=0)
+    return int(cell[0]), grid.nodes(cell, degree, steps)[0], shapes
 
 
 def _of_nodes(nodes: FlowNodes, number: np.ndarray, weight: Array) -> tuple[np.ndarray, Array]:

@@ -87,7 +87,7 @@ def _bounds(fluid: Fluid) -> tuple[Array, Array]:
     """Lowest and highest corners [m] of the local cells."""
     grid = fluid.grid
     if grid.nested is not None:
-        return grid.nested.bounds(grid.original)
+        return grid.nested.bounds(grid.in_nested())
     index = np.unravel_index(grid.numbers, grid.grid.shape, order="F")
     low, high = (
         np.stack([edge[i + side] for edge, i in zip(grid.grid.edges, index, strict=True)], axis=1) for side in (0, 1)
@@ -148,7 +148,7 @@ def _weights(fluid: Fluid, plane: CrossingPlane, cell: int, low: Array, high: Ar
             weights.append(share * (end - begin) * shares)
     reference, weight = (np.concatenate(points) - low) / (high - low), np.concatenate(weights)
     if (sheets := fluid.grid.sheets) is not None and (number := int(fluid.grid.numbers[cell])) in sheets.successors:
-        mine = [sheets.cell_at(number, x) == fluid.grid.original[cell] for x in reference]
+        mine = [sheets.cell_at(number, x) == fluid.grid.in_sheets[cell] for x in reference]
         reference, weight = reference[mine], weight[mine]
     if not len(weight):  # a body covers all of the section
         return np.zeros((1, dim))

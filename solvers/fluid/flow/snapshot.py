@@ -45,7 +45,10 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     if velocity is None or pressure is None or shares is None:
         return None
     mesh = grid.grid.mesh() if grid.nested is None else grid.nested.picture()
-    place = np.arange(len(shares)) if grid.sheets is None else grid.sheets.box_cells(np.arange(len(shares)))
+    place = np.arange(len(mesh.cells))
+    if grid.sheets is not None:
+        copied = grid.sheets.cells
+        place = np.concatenate([place, copied if grid.nested is None else grid.nested.cell_of[copied]])
     fraction = np.bincount(place, shares[:, 0])[:, None]
     active = fraction[:, 0] > 0.0
     nodes, cells = np.unique(mesh.cells[active], return_inverse=True)

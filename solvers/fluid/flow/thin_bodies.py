@@ -21,7 +21,6 @@ from solvers.fluid.geometry.thin.sheets import Sheets, closed_way, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.grid.box import FACES, Grid
-from solvers.fluid.grid.nested import Nested
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.surfaces.immersed import ImmersedBody
@@ -34,9 +33,8 @@ from solvers.fluid.surfaces.surface import Motion, tied, wetness
 THICK_IN_CONTACT = {2: float(THIN), 3: 1.0}
 
 CLOSED_WAY = (
-    "bodies close a way of the fluid by touching each other or a wall ({names}); in nested and periodic cells both "
-    "sides share unknowns there, and fluid would pass: let them overlap by half a cell, or leave out 'refine' and "
-    "'periodic'"
+    "bodies close a way of the fluid by touching each other or a wall ({names}); in periodic cells both "
+    "sides share unknowns there, and fluid would pass: let them overlap by half a cell, or leave out 'periodic'"
 )
 
 
@@ -61,7 +59,7 @@ class ThinBodies:
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
-        plain = not periodic and not isinstance(grid, Nested)
+        plain = not periodic
         # what moves with the iterates would touch and part in the course of a step
         self._thin, self._may_close = True, all(body.motion is not None for body in bodies)
         self._plain = plain
@@ -82,7 +80,7 @@ class ThinBodies:
         """Sheets of the fluid around surfaces at their present positions.
 
         None if no body has been thin yet, which the first position in a step decides. Raises StepFailed where bodies
-        close a way in nested or periodic cells.
+        close a way in periodic cells.
         """
         if self._may_close and not self._plain:
             self._require_open(facets, motion.x)

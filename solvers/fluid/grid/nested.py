@@ -62,6 +62,11 @@ class Nested(Grid):
         """Mask of the cells of the lattice that are not of the finest level in the mesh."""
         return np.asarray(self.width[self.cell_of] > 1)
 
+    def lattice_numbers(self, cells: Indices) -> Indices:
+        """Number of the lowest cell of the lattice in cells of the mesh; further cells follow the lattice's."""
+        count = len(self.first)
+        return np.where(cells < count, self.first[np.minimum(cells, count - 1)], cells - count + self.size)
+
     def coarser(self) -> Grid:
         """The grid without its finest level: the cells of that are merged, 2^dim of them to one."""
         edges, low = tuple(edge[::2] for edge in self.edges), self._lowest(np.arange(len(self.first))) // 2
@@ -91,6 +96,11 @@ class Nested(Grid):
         """Numbers of all nodes of the mesh in the lattice of nodes of a degree, increasing."""
         steps = np.array(list(product(range(degree + 1), repeat=self.dim)))
         return np.unique(self.nodes(np.arange(len(self.first)), degree, steps))
+
+    def consecutive(self, numbers: Indices, degree: int) -> Indices:
+        """Position of nodes in `all_nodes`; further nodes, whose numbers follow the lattice's, follow all of them."""
+        nodes, size = self.all_nodes(degree), int(np.prod(self._node_counts(degree)))
+        return np.where(numbers < size, np.searchsorted(nodes, numbers), len(nodes) + numbers - size)
 
     def corners(self, degree: int) -> Indices:
         """Numbers of the points of `picture` in the lattice of nodes of a degree, in the order of the points."""

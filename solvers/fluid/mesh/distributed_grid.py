@@ -28,11 +28,10 @@ class DistributedGrid:
         self.domain = fem.distribute(comm, mesh, axis_aligned=True, destinations=destinations)
         #: number of each local cell in the mesh, ghosts last
         self.original: Indices = fem.input_cells(self.domain)
-        #: number in the box of each local cell; of a coarser cell that of its lowest one. Only with `sheets` several
-        #: cells have the same number
-        self.numbers: Indices = self.original if sheets is None else sheets.box_cells(self.original)
-        if self.nested is not None:
-            self.numbers = self.nested.first[self.original]
+        #: the same with the number in the box, of a coarser cell that of its lowest one; those of `sheets` follow
+        self.in_sheets: Indices = self.original if self.nested is None else self.nested.lattice_numbers(self.original)
+        #: number in the box of each local cell. Only with `sheets` several cells have the same number
+        self.numbers: Indices = self.in_sheets if sheets is None else sheets.box_cells(self.in_sheets)
         self.owned = fem.owned_cells(self.domain)
         #: edge lengths [m] of the local cells, shape (cells, dim)
         self.sizes = grid.cell_sizes()[self.numbers] if self.nested is None else self._nested_sizes()
@@ -45,8 +44,13 @@ class DistributedGrid:
 
     def _nested_sizes(self) -> Array:
         assert self.nested is not None
-        low, high = self.nested.bounds(self.original)
+        low, high = self.nested.bounds(self.in_nested())
         return high - low
+
+    def in_nested(self) -> Indices:
+        """Number of each local cell in the nested grid; those of `sheets` have that of the cell in their place."""
+        assert self.nested is not None
+        return self.nested.cell_of[self.numbers].astype(np.int64)
 
     @property
     def in_box(self) -> NDArray[np.bool_]:
@@ -56,7 +60,7 @@ class DistributedGrid:
             covered[self.numbers] = True
             return covered
         mine = np.zeros(len(self.nested.first), dtype=bool)
-        mine[self.original] = True
+        mine[self.in_nested()] = True
         return mine[self.nested.cell_of]
 
     @property
@@ -67,16 +71,20 @@ class DistributedGrid:
     @property
     def apart(self) -> NDArray[np.bool_]:
         """Mask of local cells with nodes that they share with others, but not in the mesh."""
-        if self.nested is not None:
-            return self.nested.at_others[self.original]
-        return self.original >= self.grid.size
+        new = self.in_sheets >= self.grid.size
+        return new if self.nested is None else new | self.nested.at_others[self.in_nested()]
 
     def cell_nodes(self, cells: NDArray[np.int32], degree: int) -> Indices:
         """Numbers of the nodes of local cells if `joined`, in the order of DOLFINx, shape (cells, nodes)."""
         steps = fem.node_steps(self.domain, degree)
-        table = self.sheets if self.nested is None else self.nested
-        assert table is not None
-        return table.nodes(self.original[cells], degree, steps)
+        if self.nested is None:
+            assert self.sheets is not None
+            return self.sheets.nodes(self.in_sheets[cells], degree, steps)
+        nodes = self.nested.nodes(self.in_nested()[cells], degree, steps)
+        if self.sheets is not None:  # all cells near surfaces are of the finest level
+            finest = ~self.nested.coarse[self.numbers[cells]]
+            nodes[finest] = self.sheets.nodes(self.in_sheets[cells[finest]], degree, steps)
+        return nodes
 
     def find_interior_faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """(local faces, their two local cells) of all faces between two local cells; found once (collective)."""

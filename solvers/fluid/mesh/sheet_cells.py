@@ -25,7 +25,7 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
 
     counts: facets that the flow acts on.
     """
-    sheets, original = grid.sheets, grid.original
+    sheets, original = grid.sheets, grid.in_sheets
     assert sheets is not None
     box, local = sheets.grid.size, np.full(sheets.grid.size + len(sheets.cells), -1)
     local[original] = np.arange(len(original))

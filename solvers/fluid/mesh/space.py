@@ -99,16 +99,19 @@ class Unknowns:
         dofs, points = nodes.dofs[keep], nodes.points[keep]
         owned = int(np.count_nonzero(dofs[:, 0] < self.owned))
         numbers, nested = nodes.numbers[keep], self.grid.nested
-        consecutive = numbers if nested is None else np.searchsorted(nested.all_nodes(degree), numbers)
+        consecutive = numbers if nested is None else nested.consecutive(numbers, degree)
         return FlowNodes(dofs, points, numbers, self._sizes(points, degree), owned, consecutive)
 
     def _hanging(self) -> Hanging:
         assert self.grid.nested is not None
-        parts = ((self.velocity, self.degree), (self.pressure, 1))
+        parts = []
+        for nodes, degree in ((self.velocity, self.degree), (self.pressure, 1)):
+            own = nodes.numbers < np.prod(self.lattice_shape(degree))  # no node of `sheets` hangs, nor holds one
+            parts.append((nodes.dofs[own], nodes.numbers[own], int(np.count_nonzero(own[: nodes.owned])), degree))
         return Hanging(
             self.grid.comm,
             self.grid.nested,
-            [(nodes.dofs, nodes.numbers, nodes.owned, degree) for nodes, degree in parts],
+            parts,
             self.global_dofs,
             self.owned,
             (self.cell_velocity, self.cell_pressure),

@@ -31,7 +31,6 @@ from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
 from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin
 from solvers.fluid.geometry.tied_slits import slivers_of, without_slits
 from solvers.fluid.grid.box import CORNER_STEPS, Grid
-from solvers.fluid.grid.nested import Nested
 from solvers.fluid.surfaces.immersed import ImmersedBody
 from solvers.fluid.surfaces.surface import together
 from solvers.mesh.gauss import gauss
@@ -386,8 +385,8 @@ def _neighbours(grid: Grid, cells: Indices) -> set[tuple[int, int]]:
 
 
 def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
-    """Sheets of the fluid around bodies at rest that are thin or close a way; None if none is, or in nested cells."""
-    if isinstance(grid, Nested) or not bodies or not all(body.rests for body in bodies):
+    """Sheets of the fluid around bodies at rest that are thin or close a way; None if none is."""
+    if not bodies or not all(body.rests for body in bodies):
         return None
     motions = [body.motion(0.0) for body in bodies if body.motion is not None]
     facets, motion = together([body.surface for body in bodies], motions, grid.dim)

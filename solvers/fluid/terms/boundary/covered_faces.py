@@ -135,7 +135,7 @@ def _covered(
     areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
     wet = found.weights[row_of[number[touched]]]
     if grid.sheets is not None:
-        for row, cell in enumerate(grid.original[cells[touched]].tolist()):
+        for row, cell in enumerate(grid.in_sheets[cells[touched]].tolist()):
             share = grid.sheets.shares.get(cell)
             if share is not None and (found_wet := share.wet(axis, side, points)) is not None:
                 wet[row] = found_wet
