@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady, turned, values
+from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady, step, turned, values
+from programs import fsci
 
+from fsci.running.history import read_history
 from solvers.fluid.flow.probes import at_point
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.grid.nested import RefinedBox, refined
@@ -72,3 +74,84 @@ def test_two_parabolas(thickness):
         assert np.abs(p[wet]).max() < 1e-12
         drag = fluid.force()["plate"].sum(axis=0)[0]
         assert drag == pytest.approx((low + 1.0 - high) / 2.0 * 2.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 0.2, 1.0, 3.0])
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_plate_that_moves_along_a_channel(element, thickness):
+    """Nothing passes it, and it carries the difference of the pressures in each step; coarse cells stay where they are.
+
+    The angle is such that both its ends are outside of the box.
+    """
+    size, dt, angle, pressures = 0.0625, 0.1, 0.21, (1.0, 0.7)
+    speed, along = 0.9 * size / dt, np.array([1.0, 0.0])
+    plate, facets = block([-thickness * size / 2, -1.5], [thickness * size / 2, 1.5])
+    patches = [
+        Patch("in", ("x-",), "traction", field(pressures[0], 0.0)),
+        Patch("out", ("x+",), "traction", field(-pressures[1], 0.0)),
+        Patch("w", ("y-", "y+"), "slip"),
+    ]
+    fluid = make_fluid(
+        refined(uniform([0, 0], [3, 1], [24, 8]), [RefinedBox([0.6, 0.0], [2.4, 1.0], 1)]), patches,
+        [body("plate", turned(plate, angle) + np.array([1.37, 0.51]), facets,
+              motion=lambda x, t: (x + speed * t * along, 0.0 * x + speed * along))],
+        element=element, mu=0.05, dt=dt, initial_velocity=field(speed, 0.0),
+    )  # fmt: skip
+    force = (pressures[0] - pressures[1]) / np.cos(angle) * np.array([np.cos(angle), np.sin(angle)])
+    for count in range(4):
+        step(fluid, count * dt, dt)
+        nodes = fluid.unknowns.velocity.dofs
+        velocity = fluid.flow[nodes][fluid.system.active_dofs[nodes[:, 0]]]
+        assert np.abs(velocity - speed * along).max() < 1e-9
+        assert np.abs(fluid.force()["plate"].sum(axis=0) - force).max() < 1e-9
+    assert fluid.renewals > 3
+
+
+CASE = """\
+time: {{step: 0.05, end: 0.1}}
+fluid:
+  density: 1
+  viscosity: 0.02
+  element: {element}
+  grid: {{from: [0, 0], to: [1.6, 1], cells: [8, 5], refine: [{refine}]}}
+  patches:
+    inlet: {{on: x-, traction: [0, 0]}}
+    outlet: {{on: x+, outflow: true}}
+    walls: {{on: [y-, y+], no_slip: true}}
+  bodies:
+    leaf:
+      mesh: {{shape: rectangle, size: [0.02, 0.4], cells: [1, 4], origin: [0.61, 0.31], rotate: {{angle: 10}}}}
+      motion: {{displacement: ["4*t^2", "0.3*t^2"]}}
+probes:
+  force: {{quantity: force, body: leaf}}
+  before: {{quantity: pressure, at: [0.8, 0.57]}}
+  behind: {{quantity: pressure, at: [0.4, 0.57]}}
+  rate: {{quantity: flow_rate, through: outlet}}
+  section: {{quantity: flow_rate, plane: {{point: [0.63, 0.5], normal: [1, 0]}}}}
+  energy: {{quantity: kinetic_energy}}
+  volume: {{quantity: volume}}
+"""
+COLUMNS = ("force.x", "force.y", "before", "behind", "rate", "section", "energy", "volume", "fluid.mass")
+BOXED, FOLLOWED = "{box: [[0, 0], [1.4, 1]], level: 1}", "{around: leaf, layers: 4, level: 2}"
+
+
+def results(folder, element, refine, processes, resumed):
+    (folder / "case.yaml").write_text(CASE.format(element=element, refine=refine))
+    out = folder / f"{processes}{resumed}"
+    done = fsci("run", folder, "-o", out, processes=processes)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = fsci("resume", out, "--set", "time.end=0.2", processes=resumed)
+    assert done.returncode == 0, done.stdout + done.stderr
+    history = read_history(out / "history.csv")
+    assert len(history["before"]) == 4
+    return history
+
+
+@pytest.mark.parametrize("refine", [BOXED, FOLLOWED], ids=["boxed", "followed"])
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+def test_two_processes(tmp_path, element, refine):
+    """A plate with both ends in the flow, and a run that goes on with other processes; all probes follow it."""
+    one, two = (results(tmp_path, element, refine, *counts) for counts in ((1, 2), (2, 1)))
+    for name in COLUMNS:
+        assert np.allclose(one[name], two[name], rtol=1e-8, atol=1e-10), name
+    assert np.abs(one["fluid.mass"]).max() < 1e-12

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
 
 from solvers.api import Array, State
 from solvers.fluid.flow.behind import with_walls
@@ -178,13 +179,20 @@ class FlowOnCells:
         Returns the numbers of the nodes of the pressure whose equations changed; None: the cells stay.
         """
         before, old, flow, history = self.box, self.parts.unknowns, self.flow, self.history
+        sheets = self.parts.grid.sheets
         assert isinstance(before, Nested)
         cells = following.cells(before, ways)
         if cells is before:
             return None
-        matrices = [interpolation(before, cells, degree) for degree in (self._settings.degree, 1)]
+        matrices = []
+        for degree in (self._settings.degree, 1):
+            matrix = interpolation(before, cells, degree)
+            if sheets is not None:  # nodes of the sheets are far from the cells that change
+                further = sheets.node_count(degree) - sheets.lattice_size(degree)
+                matrix = sparse.block_diag([matrix, sparse.identity(further)], format="csr")
+            matrices.append(matrix)
         self.box = cells
-        self._renew(None)
+        self._renew(sheets)
         carrier = Carrier(old, self.parts.unknowns, *matrices)
         self.flow[:] = carrier.flow(flow)
         history.replace([carrier.past(past) for past in history.past], carrier.flow(history.pressure_change))

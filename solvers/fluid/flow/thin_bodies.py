@@ -210,8 +210,12 @@ class Carrying:
     def __call__(self, old: Unknowns, before: Sheets | None) -> Carrier:
         """The transfer from old unknowns; before: their sheets, None: nodes of the box."""
         degree = self._new.degree
-        matrices = {one: self._matrix(before, one) for one in {degree, 1}}
-        return Carrier(old, self._new, matrices[degree], matrices[1], self._walls())
+        matrices = {
+            one: self._matrix(before, one)[_numbers(self._new, self._after, one)][:, _numbers(old, before, one)]
+            for one in {degree, 1}
+        }
+        walls = self._walls()[_numbers(self._new, self._after, degree)]
+        return Carrier(old, self._new, matrices[degree], matrices[1], walls)
 
     def _matrix(self, before: Sheets | None, degree: int) -> sparse.csr_matrix:
         if before is not None:
@@ -219,6 +223,15 @@ class Carrying:
         count = self._after.node_count(degree)
         entries = (np.ones(count), (np.arange(count), self._after.on_lattice(np.arange(count), degree)))
         return sparse.csr_matrix(entries, shape=(count, self._after.lattice_size(degree)))
+
+
+def _numbers(unknowns: Unknowns, sheets: Sheets | None, degree: int) -> NDArray[np.int64] | slice:
+    """Numbers of nodes in the order of `FlowNodes.consecutive`."""
+    if (nested := unknowns.grid.nested) is None:
+        return slice(None)
+    size = int(np.prod(unknowns.lattice_shape(degree)))
+    further = size if sheets is None else sheets.node_count(degree)
+    return np.concatenate([nested.all_nodes(degree), np.arange(size, further)])
 
 
 def _seen(sides: Sides, of_facets: Array) -> Array:

@@ -24,7 +24,7 @@ class DistributedGrid:
         """destinations: processes of the cells of a box; None: by their graph (collective)."""
         self.comm, self.grid, self.sheets = comm, grid, sheets
         self.nested = grid if isinstance(grid, Nested) else None
-        mesh = (grid if sheets is None else sheets).mesh() if comm.rank == 0 else None
+        mesh = (grid.mesh() if sheets is None else sheets.mesh(grid)) if comm.rank == 0 else None
         self.domain = fem.distribute(comm, mesh, axis_aligned=True, destinations=destinations)
         #: number of each local cell in the mesh, ghosts last
         self.original: Indices = fem.input_cells(self.domain)

@@ -134,9 +134,12 @@ class Sheets:
         region = self.parts.region_at(cell, x)
         return next((c for c in there if region in self.shares[c].regions), there[0])
 
-    def mesh(self) -> Mesh:
-        """Mesh of the box and of the new cells, which are not connected to others, except pairs to each other."""
-        box, dim = self.grid.mesh(), self.grid.dim
+    def mesh(self, grid: Grid) -> Mesh:
+        """Mesh of a grid on the lattice of the box and of the new cells.
+
+        These are not connected to others, except pairs to each other.
+        """
+        box, dim = grid.mesh(), self.grid.dim
         index = np.stack(np.unravel_index(self.cells, self.grid.shape, order="F"), axis=1)
         points, cells, count = [box.points], [box.cells], len(box.points)
         for units in (index[: self.singles, None], index[self.singles :].reshape(-1, 2, dim)):
