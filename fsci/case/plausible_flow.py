@@ -111,7 +111,7 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
     """
     smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
-    plain = not fluid.grid.refine and not any(patch.periodic for patch in fluid.patches.values())
+    plain = not any(patch.periodic for patch in fluid.patches.values())
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
     body = "a body that moves" if moves else "a body"
