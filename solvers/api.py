@@ -37,7 +37,6 @@ class FailureKind(Enum):
     MOTION = "motion"  #: a body moves or turns too far in one step
     COARSE_CELLS = "coarse cells"  #: a body is close to cells that are not of the finest level
     PERIODIC_FACES = "periodic faces"  #: a body reaches the end of the period
-    CLOSED_WAY = "closed way"  #: bodies close a way of the fluid where both sides share unknowns
     NO_ROOM = "no room"  #: no motion of rigid bodies opens all of their overlaps
     JAMMED = "jammed"  #: friction of rigid bodies that no contact forces fulfil
     PASSAGE = "passage"  #: a sentinel: a body has leapt or passed through another one, in too long a step

@@ -39,10 +39,6 @@ OF_KIND: dict[FailureKind, tuple[str, ...]] = {
     ),
     FailureKind.COARSE_CELLS: ("fluid.grid.refine: a box that holds the body wherever it goes",),
     FailureKind.PERIODIC_FACES: ("a longer box, or an earlier time.end",),
-    FailureKind.CLOSED_WAY: (
-        "bodies that overlap each other or the walls by half a cell where they close the way",
-        "fluid.grid without refine and patches without periodic: there each side has cells of its own",
-    ),
     FailureKind.NO_ROOM: ("room for the bodies: one that is free or softer, or motions that leave a gap",),
     FailureKind.JAMMED: (
         "contact.friction: a smaller coefficient",

@@ -26,11 +26,11 @@ from solvers.fluid.terms.slip_history import SlipHistory
 class MovingBodies:
     """All bodies, as one surface with vertices and facets numbered body by body."""
 
-    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], settings: FlowSettings, repeated: Sequence[int]):
+    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], settings: FlowSettings, repeated: tuple[int, ...]):
         """repeated: periodic axes of the box."""
         self.bodies, self._box, self._repeated, self._steady = list(bodies), grid, repeated, settings.steady
-        self.sheets_at_start = None if repeated else sheets_of(grid, bodies)  #: around bodies at rest
-        self.thin = ThinBodies(grid, bodies, bool(repeated), self.sheets_at_start)
+        self.sheets_at_start = sheets_of(grid, bodies, repeated)  #: around bodies at rest
+        self.thin = ThinBodies(grid, bodies, repeated, self.sheets_at_start)
         self.motions: list[Motion] = []  #: of the bodies at present
         self.surfaces = AllSurfaces([body.surface for body in bodies], grid.dim)
         sweep = [np.full(len(b.surface.facets), b.sweeps) for b in bodies]

@@ -111,8 +111,11 @@ def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
 def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
     """Raise StepFailed if a body reaches a periodic face: it would not cut cells at the opposite face (collective)."""
     grid = unknowns.grid
-    changed = cut.fraction < 1.0 - NOTHING
-    changed[np.concatenate([cut.cut, cut.strip])] = True
+    if grid.sheets is not None:  # which have cells with fluid of one side far from surfaces, too
+        changed = grid.sheets.parts.special[grid.numbers]
+    else:
+        changed = cut.fraction < 1.0 - NOTHING
+        changed[np.concatenate([cut.cut, cut.strip])] = True
     indices = np.unravel_index(grid.numbers[changed], grid.grid.shape, order="F")
     for axis in unknowns.periodic:
         at_end = np.isin(indices[axis], [0, grid.grid.shape[axis] - 1]).any()

@@ -151,7 +151,7 @@ def _continued_to(
     shape = (rows, sheets.node_count(degree))
     if not len(numbers):
         return sparse.csr_matrix(shape)
-    index = np.stack(np.unravel_index(places, [degree * n + 1 for n in grid.shape], order="F"), axis=1)
+    index = np.stack(np.unravel_index(places, sheets.lattice_shape(degree), order="F"), axis=1)
     window = np.array(list(product(range(-LAYERS_AROUND - 1, LAYERS_AROUND + 1), repeat=grid.dim)))
     cells = (index // degree)[:, None, :] + window
     inside = ((cells >= 0) & (cells < grid.shape)).all(axis=2)

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.api import Array, FailureKind, State, StepFailed
+from solvers.api import Array, State
 from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.geometry.pieces import off_boundary
 from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined_in, recurring
-from solvers.fluid.geometry.thin.sheets import Sheets, closed_way, find_sheets
+from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
-from solvers.fluid.grid.box import FACES, Grid
+from solvers.fluid.grid.box import Grid
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.surfaces.immersed import ImmersedBody
@@ -31,11 +31,6 @@ from solvers.fluid.surfaces.surface import Motion, tied, wetness
 #: course. In 3D elastic bodies of 0.3 cells were computed; from one cell on it is as without separate cells, because
 #: no elastic body between one and two cells has been tried. They leak little (docs/theory_fsci.md).
 THICK_IN_CONTACT = {2: float(THIN), 3: 1.0}
-
-CLOSED_WAY = (
-    "bodies close a way of the fluid by touching each other or a wall ({names}); in periodic cells both "
-    "sides share unknowns there, and fluid would pass: let them overlap by half a cell, or leave out 'periodic'"
-)
 
 
 def thickest(dim: int) -> float:
@@ -51,19 +46,17 @@ def thickest(dim: int) -> float:
 class ThinBodies:
     """Finds the sheets of the fluid for each position of the bodies, after one of these has been thin."""
 
-    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
-        self._grid, self.follows, self._sheets = grid, False, sheets
+    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], repeated: tuple[int, ...], sheets: Sheets | None):
+        """repeated: periodic axes of the box; sheets: around bodies at rest."""
+        self._grid, self._repeated, self.follows, self._sheets = grid, repeated, False, sheets
         surfaces = [body.surface for body in bodies]
         self._wet, self._tied = wetness(surfaces), tied(surfaces)
-        self._names = np.repeat([surface.name for surface in surfaces], [len(s.facets) for s in surfaces])
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
-        plain = not periodic
         # what moves with the iterates would touch and part in the course of a step
         self._thin, self._may_close = True, all(body.motion is not None for body in bodies)
-        self._plain = plain
-        self._possible: bool | None = None if moving and plain else False
+        self._possible: bool | None = None if moving else False
         self._x: Array | None = None
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
         self._closed: NDArray[np.int64] | None = None  #: `Sheets.closed` of this step; None: it has no sheets yet
@@ -79,11 +72,8 @@ class ThinBodies:
     def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
         """Sheets of the fluid around surfaces at their present positions.
 
-        None if no body has been thin yet, which the first position in a step decides. Raises StepFailed where bodies
-        close a way in periodic cells.
+        None if no body has been thin yet, which the first position in a step decides.
         """
-        if self._may_close and not self._plain:
-            self._require_open(facets, motion.x)
         if self._possible is None:
             self._thin = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
             self._possible = self._thin or self._may_close
@@ -119,28 +109,8 @@ class ThinBodies:
             closing=self._may_close,
             joined=self._joined,
             tied=ties,
+            repeated=self._repeated,
         )
-
-    def _require_open(self, facets: NDArray[np.int64], x: Array) -> None:
-        if self._x is not None and np.array_equal(self._x, x):
-            return
-        places = {self._around(place, facets, x): place for place in closed_way(self._grid, facets, x)}
-        if places:
-            names = min(places, key=lambda some: sum(name.startswith("face") for name in some))
-            all_names = ", ".join(map(" and ".join, [names, *(other for other in places if other != names)]))
-            where = tuple(places[names].tolist())
-            raise StepFailed("fluid", FailureKind.CLOSED_WAY, CLOSED_WAY.format(names=all_names), where=where)
-        self._x = x
-
-    def _around(self, place: Array, facets: NDArray[np.int64], x: Array) -> tuple[str, ...]:
-        """Names of the bodies and faces of the box in the cells around a node [m]."""
-        edges = self._grid.edges
-        size = np.array([cell_sizes_at(edge, np.array([c])).max() for edge, c in zip(edges, place, strict=True)])
-        near = (x[facets].min(axis=1) <= place + size) & (x[facets].max(axis=1) >= place - size)
-        bodies = dict.fromkeys(self._names[near.all(axis=1)].tolist())
-        away = np.abs([edge[[0, -1]] - c for edge, c in zip(edges, place, strict=True)]).ravel()
-        faces = [name for name, near_it in zip(FACES, away <= np.repeat(size, 2), strict=False) if near_it]
-        return (*(f"'{name}'" for name in bodies), *(f"face {name}" for name in faces))
 
     def _join_parts(self, now: Sheets) -> bool:
         """Keep parts joined until the step ends that these sheets divide in vain; returns whether some are new."""

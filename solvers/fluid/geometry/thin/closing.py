@@ -12,7 +12,7 @@ from scipy import ndimage
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices, Mask
 from solvers.fluid.geometry.pieces import FLUSH, NOTHING
-from solvers.fluid.grid.box import CORNER_STEPS, Grid
+from solvers.fluid.grid.box import Grid
 
 
 def may_touch(grid: Grid, facets: Indices, x: Array) -> bool:
@@ -40,11 +40,10 @@ def are_apart(grid: Grid, uncut: Mask) -> bool:
     return int(ndimage.label(grid.as_box(uncut))[1]) > 1
 
 
-def closed_at(grid: Grid, moments, cells: Indices, links: Indices) -> Array:
-    """Points [m] where uncut cells are connected by a corner of cells with fluid, but not across faces with fluid.
+def close_a_way(grid: Grid, moments, cells: Indices, links: Indices) -> bool:
+    """Whether some uncut cells are connected by corners of cells with fluid, but not across faces with fluid.
 
-    Shape (n, dim), empty if there are none. cells: of parts of fluid around surfaces; links: pairs of these parts that
-    fluid connects, in the first columns.
+    cells: of parts of fluid around surfaces; links: pairs of these parts that fluid connects, in the first columns.
     """
     uncut = uncut_cells(grid, moments)
     label, count = ndimage.label(grid.as_box(uncut))
@@ -57,20 +56,4 @@ def closed_at(grid: Grid, moments, cells: Indices, links: Indices) -> Array:
     fluid = moments.fraction < 1.0 - NOTHING
     by_corners = ndimage.label(grid.as_box(fluid), np.ones((3,) * grid.dim))[0].ravel(order="F")[uncut]
     pairs = np.unique(np.stack([across_faces, by_corners]), axis=1)
-    if pairs.shape[1] == len(np.unique(by_corners)):
-        return np.empty((0, grid.dim))
-    return _between_sides(grid, cells, side[: len(cells)], across_faces)
-
-
-def _between_sides(grid: Grid, cells: Indices, side: Indices, large: Indices) -> Array:
-    """Corners [m] of cells whose parts are on different sides; on two large ones, unless small ones lie between."""
-    index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
-    corners = (index[:, None, :] + CORNER_STEPS[grid.dim]).reshape(-1, grid.dim)
-    sides = np.repeat(side, len(CORNER_STEPS[grid.dim]))
-    ends = np.unique(np.column_stack([corners, sides]), axis=0)
-    nodes, of_node = np.unique(ends[:, :-1], axis=0, return_inverse=True)
-    of_large = np.bincount(of_node.ravel(), np.isin(ends[:, -1], large))
-    several = np.bincount(of_node.ravel()) > 1
-    count = np.where(several, np.minimum(of_large, 2.0), -1.0)
-    found = nodes[several & (count == count.max())]
-    return np.stack([edge[i] for edge, i in zip(grid.edges, found.T, strict=True)], axis=1)
+    return pairs.shape[1] > len(np.unique(by_corners))

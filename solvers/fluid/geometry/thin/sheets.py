@@ -24,7 +24,7 @@ from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices, Mask
 from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.pieces import off_boundary, without_slivers
-from solvers.fluid.geometry.thin.closing import are_apart, closed_at, may_touch, uncut_cells
+from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
 from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND, FluidParts, grown, parts_of_fluid, ragged
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
@@ -90,6 +90,7 @@ class Sheets:
     parts: FluidParts
     #: cells of the box in which bodies touched when the step began, sorted
     closed: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    repeated: tuple[int, ...] = ()  #: periodic axes: nodes at their ends are those at their beginnings
 
     def same_unknowns(self, other: Sheets) -> bool:
         """The mesh and what is linked in it are the same, wherever the surface is in the cells."""
@@ -171,9 +172,13 @@ class Sheets:
         further = size + np.searchsorted(self._further(degree), copy * size + number)
         return np.where(copy > 0, further, number)
 
+    def lattice_shape(self, degree: int) -> tuple[int, ...]:
+        """Nodes of the lattice of the box per direction; along a periodic axis the last one is not counted."""
+        return tuple(degree * n + (axis not in self.repeated) for axis, n in enumerate(self.grid.shape))
+
     def lattice_size(self, degree: int) -> int:
         """Nodes of the lattice of the box."""
-        return int(np.prod([degree * n + 1 for n in self.grid.shape]))
+        return int(np.prod(self.lattice_shape(degree)))
 
     def node_count(self, degree: int) -> int:
         """Count of nodes: those of the lattice and the copies."""
@@ -190,15 +195,15 @@ class Sheets:
         size, finer = self.lattice_size(1), self.lattice_size(degree)
         keys = np.concatenate([self._further(1), [0]])[np.maximum(numbers - size, -1)]
         copy = np.where(numbers < size, 0, keys // size)
-        index = np.unravel_index(self.on_lattice(numbers, 1), [n + 1 for n in self.grid.shape], order="F")
-        counts = [degree * n + 1 for n in self.grid.shape]
-        there = np.ravel_multi_index([degree * i for i in index], counts, order="F")
+        index = np.unravel_index(self.on_lattice(numbers, 1), self.lattice_shape(1), order="F")
+        there = np.ravel_multi_index([degree * i for i in index], self.lattice_shape(degree), order="F")
         return np.where(copy > 0, finer + np.searchsorted(self._further(degree), copy * finer + there), there)
 
     def _lattice(self, cells: Indices, degree: int, steps: Indices) -> Indices:
         index = np.stack(np.unravel_index(cells, self.grid.shape, order="F"), axis=1)
-        counts = [degree * n + 1 for n in self.grid.shape]
-        return np.ravel_multi_index(tuple(np.moveaxis(degree * index[:, None, :] + steps, 2, 0)), counts, order="F")
+        counts = self.lattice_shape(degree)
+        at = (degree * index[:, None, :] + steps) % np.array(counts)
+        return np.ravel_multi_index(tuple(np.moveaxis(at, 2, 0)), counts, order="F")
 
     def _further(self, degree: int) -> Indices:
         """All copies of nodes, each as copy * size + number in the lattice."""
@@ -240,6 +245,7 @@ def find_sheets(
     closing: bool = False,
     joined: Joined = MappingProxyType({}),
     tied: tuple[Mask, Mask] | None = None,
+    repeated: tuple[int, ...] = (),
 ) -> Sheets | None:
     """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin, unless `always`.
 
@@ -248,7 +254,7 @@ def find_sheets(
     bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides; 0:
     no body is thin.
     joined: parts of fluid in these cells at these facets share their nodes. tied: masks of the facets that are tied and
-    of those that the flow acts on; None: no body is tied.
+    of those that the flow acts on; None: no body is tied. repeated: periodic axes, whose faces no body reaches.
     """
     if not len(facets):
         return None
@@ -274,7 +280,7 @@ def find_sheets(
         if grid.dim == 3:
             close = _opposed(grid, cells, facing, close, thin)
         if not (may_part and _is_thin(grid, cells, links, facing, close, thin)) and not (
-            may_close and len(closed_at(grid, moments, cells, links))
+            may_close and close_a_way(grid, moments, cells, links)
         ):
             return None
     copies = node_copies(grid, cells, parts.share, links, same_nodes(parts, joined), special)
@@ -319,24 +325,8 @@ def find_sheets(
         np.column_stack([cell_of[part], facet])[cell_of[part] >= 0],
         np.intersect1d(parts.touching, cells),
         parts,
+        repeated=repeated,
     )
-
-
-def closed_way(grid: Grid, facets: Indices, x: Array) -> Array:
-    """Points [m] where bodies close a way of the fluid by touching, so that both sides share nodes, shape (n, dim).
-
-    facets, x: as in `find_sheets`.
-    """
-    if not len(facets) or not may_touch(grid, facets, x):
-        return np.empty((0, grid.dim))
-    x = without_slivers(grid, facets, x)
-    moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
-    if not are_apart(grid, uncut_cells(grid, moments)):
-        return np.empty((0, grid.dim))
-    if (surfaces := closed_surfaces(facets, x)) is None:
-        return np.empty((0, grid.dim))
-    parts = parts_of_fluid(grid, moments, surfaces, x)
-    return closed_at(grid, moments, parts.cell, parts.links)
 
 
 def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
@@ -387,10 +377,10 @@ def _neighbours(grid: Grid, cells: Indices) -> set[tuple[int, int]]:
     return {pair for pair in found if pair[1] in members}
 
 
-def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
+def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody], repeated: tuple[int, ...] = ()) -> Sheets | None:
     """Sheets of the fluid around bodies at rest that are thin or close a way; None if none is."""
     if not bodies or not all(body.rests for body in bodies):
         return None
     motions = [body.motion(0.0) for body in bodies if body.motion is not None]
     facets, motion = together([body.surface for body in bodies], motions, grid.dim)
-    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]), closing=True)
+    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]), closing=True, repeated=repeated)
