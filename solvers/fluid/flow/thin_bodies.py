@@ -20,6 +20,7 @@ from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined
 from solvers.fluid.geometry.thin.sheets import Sheets, closed_way, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
+from solvers.fluid.geometry.thin.walls import facets_of_walls
 from solvers.fluid.grid.box import FACES, Grid
 from solvers.fluid.grid.nested import Nested
 from solvers.fluid.mesh.space import Unknowns
@@ -60,7 +61,7 @@ class ThinBodies:
         self._names = np.repeat([surface.name for surface in surfaces], [len(s.facets) for s in surfaces])
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
-        self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
+        self._touch = touch
         plain = not periodic and not isinstance(grid, Nested)
         # what moves with the iterates would touch and part in the course of a step
         self._thin, self._may_close = True, all(body.motion is not None for body in bodies)
@@ -87,7 +88,7 @@ class ThinBodies:
         if self._may_close and not self._plain:
             self._require_open(facets, motion.x)
         if self._possible is None:
-            self._thin = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
+            self._thin = self._may_be_thin(facets, motion.x)
             self._possible = self._thin or self._may_close
         if not self._possible or (self._searched and not self.follows):
             return self._sheets
@@ -106,6 +107,14 @@ class ThinBodies:
             if not np.array_equal(self._sheets.closed, self._closed):
                 self._sheets = replace(self._sheets, closed=self._closed)
         return self._sheets
+
+    def _may_be_thin(self, facets: NDArray[np.int64], x: Array) -> bool:
+        grid, most = self._grid, thickest(self._grid.dim)
+        if not self._touch:
+            return may_be_thin(grid, facets[self._wet], x, most)
+        if may_be_thin(grid, facets[self._wet], x, THICK_IN_CONTACT[grid.dim]):
+            return True
+        return may_be_thin(grid, facets[self._wet & facets_of_walls(grid, facets, x)], x, most)
 
     def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
         off = off_boundary(self._grid, x[facets])
