@@ -54,9 +54,9 @@ def test_walls_of_any_thickness_are_tight(tmp_path, inner):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("inner", "x", "end"), [(0.24, 0.0, 0.5), (0.12, 0.0, 0.3), (0.12, 0.0185, 0.24)])
-def test_closed_contact_squeezes_nothing_out(tmp_path, inner, x, end):
-    """Onto floor, lid and the opposite side, also moved by a third of a cell. Shared unknowns lose 16 %."""
-    history, volume = squeezed(tmp_path, inner, end, x)
+@pytest.mark.parametrize(("x", "end"), [(0.0, 0.3), (0.0185, 0.24)])
+def test_closed_contact_squeezes_nothing_out(tmp_path, x, end):
+    """A wall of 3.6 cells, onto floor and lid, also moved by a third of a cell. Shared unknowns lose 16 %."""
+    history, volume = squeezed(tmp_path, 0.12, end, x)
     assert history["contact.active"].max() > 3
     np.testing.assert_allclose(volume, 1.0, rtol=1e-9)
