@@ -96,9 +96,9 @@ class ThinBodies:
             found = self._find(facets, motion.x)
             if found is not None and self._join_parts(found):
                 found = self._find(facets, motion.x)
-            iterate = found is not None and self._first is not None
-            if iterate and not (self._tried and self._tried[-1].same_unknowns(found)):
-                self._tried.append(found)
+            if found is not None and self._first is not None:
+                if not (self._tried and self._tried[-1].same_unknowns(found)):
+                    self._tried.append(found)
             self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
         if self._sheets is not None:
             if self._first is None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.api import Indices, Mask
+from solvers.api import Array, Indices, Mask
 from solvers.cut_cells import components_of
 from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.thin.fluid_parts import COUNTS, Geometry
 from solvers.fluid.grid.box import Grid
 
 
-def facets_of_walls(grid: Grid, facets: Indices, x) -> Mask:
+def facets_of_walls(grid: Grid, facets: Indices, x: Array) -> Mask:
     """Mask of the facets of walls; fluid that is enclosed without a cell full of it does not count.
 
     facets, x: as in `find_sheets`. None are walls if a surface is open.
