@@ -296,7 +296,7 @@ def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves:
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
     sizes = thickness(mesh), _length(mesh)
-    if warning := thin_body(case, case.fluid, *sizes, moves=moves, hollow=_is_hollow(mesh)):
+    if warning := thin_body(case, case.fluid, *sizes, moves=moves, hollow=is_hollow(mesh)):
         found.warnings.append(f"{case.place(*keys, 'mesh')}: {warning}")
 
 
@@ -308,7 +308,7 @@ def _length(mesh: Mesh) -> float:
     return float(np.sort(np.ptp(mesh.points @ axes.T, axis=0))[1])
 
 
-def _is_hollow(mesh: Mesh) -> bool:
+def is_hollow(mesh: Mesh) -> bool:
     """Whether a closed part of the surface has the body outside."""
     facets, nodes = tessellate(mesh)
     part = components(nodes[facets], len(mesh.points))
