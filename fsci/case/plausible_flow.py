@@ -100,33 +100,34 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
         if not isinstance(mesh, ShapeSection) or name in one_sided:
             continue
         length = sorted(mesh.plan.extents)[-1 if fluid.grid.dimension == 2 else -2]
-        if warning := thin_body(case, fluid, mesh.plan.thickness, length, moves=moves):
+        if warning := thin_body(case, fluid, mesh.plan.thickness, length, moves=moves, hollow=mesh.plan.hollow):
             yield (section, kind, name, "mesh"), warning
 
 
-def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool) -> str | None:
+def thin_body(
+    case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool, hollow: bool
+) -> str | None:
     """What may go wrong with a body of this thickness [m]: fluid passes if both of its sides share unknowns.
 
-    length [m]: its largest extent, in 3D the second one.
+    length [m]: its largest extent, in 3D the second one; hollow: it encloses fluid, and has unknowns of each side.
     """
     smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
-    plain = not any(patch.periodic for patch in fluid.patches.values())
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
     body = "a body that moves" if moves else "a body"
     free = free_length(fluid.grid.dimension, moves=not rests) * smallest
-    separate = plain and length >= free  # each side has unknowns of its own
+    separate = length >= free  # each side has unknowns of its own
     if separate and (rests or case.contact is None):
         ends_at_walls = length >= min(b - a for a, b in zip(fluid.grid.start, fluid.grid.to, strict=True))
         if ends_at_walls or length >= 2.0 * free or extent >= least * smallest:
             return None
         why = f"if all of its edges are in the fluid, some passes through {body} with less than"
         return f"{size}, and {length / smallest:.2g} of them long: {why} {2.0 * free / smallest:.3g} cells along"
-    if separate and extent < CELLS_ACROSS_IN_CONTACT[fluid.grid.dimension] * smallest:
-        return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     if extent >= least * smallest:
         return None
+    if separate and (hollow or extent < CELLS_ACROSS_IN_CONTACT[fluid.grid.dimension] * smallest):
+        return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     why = f"where it has fluid on both sides, fluid passes through {body} with less than {least:g} cells across"
     return f"{size}: {why}; refine the grid"
 

@@ -33,6 +33,7 @@ from fsci.meshes.of_case import (
     require_inside_period,
     slave_surfaces,
 )
+from solvers.fluid.flow.conservation.cavities import components, enclosed
 from solvers.fluid.surfaces.inside import PointInBody, require_outside
 from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
 from solvers.mesh.locate import locate
@@ -294,7 +295,8 @@ def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves:
     assert case.fluid is not None
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
-    if warning := thin_body(case, case.fluid, thickness(mesh), _length(mesh), moves=moves):
+    sizes = thickness(mesh), _length(mesh)
+    if warning := thin_body(case, case.fluid, *sizes, moves=moves, hollow=is_hollow(mesh)):
         found.warnings.append(f"{case.place(*keys, 'mesh')}: {warning}")
 
 
@@ -304,6 +306,13 @@ def _length(mesh: Mesh) -> float:
         return float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     axes = np.linalg.svd(mesh.points - mesh.points.mean(axis=0), full_matrices=False)[2]
     return float(np.sort(np.ptp(mesh.points @ axes.T, axis=0))[1])
+
+
+def is_hollow(mesh: Mesh) -> bool:
+    """Whether a closed part of the surface has the body outside."""
+    facets, nodes = tessellate(mesh)
+    part = components(nodes[facets], len(mesh.points))
+    return any(enclosed(mesh.points, nodes[facets[part == number]]) < 0.0 for number in range(int(part.max()) + 1))
 
 
 def thickness(mesh: Mesh) -> float:

@@ -103,6 +103,11 @@ class MeshPlan:
         return self.nodes.directions
 
     @property
+    def hollow(self) -> bool:
+        """Whether its wall encloses a space."""
+        return set(self.surfaces) == {"inner", "outer"}
+
+    @property
     def counts(self) -> tuple[int, int]:
         """(cells, nodes) of the mesh."""
         return self.nodes.cells * SIMPLICES.get(self.cell, 1), self.nodes.nodes

@@ -146,3 +146,17 @@ cells: [1, 4]}}, material: {{law: neo_hooke, E: 1, nu: 0, density: 1}}}}}}}}\nco
     found = [str(warning) for warning in load_case(tmp_path).warnings if "of the smallest cells:" in str(warning)]
     assert len(found) == (words is not None)
     assert not words or words in found[0]
+
+
+def test_check_knows_that_a_hollow_body_has_unknowns_of_both_sides(tmp_path):
+    """A ring of 2.5 cells in contact; the quarter of one is open."""
+    text = without(CASE.format(thickness=1, motion=""), "fluid", "bodies")
+    for angle, words in ((360, "nothing passes through it"), (90, "fluid passes through a body that moves")):
+        body = f"structure: {{dynamics: {{}}, bodies: {{plate: {{mesh: {{shape: ring, inner_radius: 2, outer_radius: \
+2.25, angle: {angle}, cells: [16, 1]}}, material: {{law: neo_hooke, E: 1, nu: 0, density: 1}}}}}}}}\ncoupling: {{}}\n"
+        (tmp_path / "case.yaml").write_text(text + body + CONTACT.replace("top", "outer").replace("bottom", "inner"))
+        found = [
+            str(warning) for warning in load_case(tmp_path).warnings if "2.5 of the smallest cells:" in str(warning)
+        ]
+        assert len(found) == 1
+        assert words in found[0]

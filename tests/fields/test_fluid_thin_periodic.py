@@ -29,7 +29,8 @@ def thin_ring(x, y, radius, thickness):
 def driven(x, thickness, element, cells=(12, 8)):
     """A flow that a force drives past a ring at rest."""
     fluid = make_fluid(
-        uniform([0, 0], [CELL * cells[0], 1.0], cells), PERIOD, [body("ring", *thin_ring(x, 0.515625, 0.28, thickness))],
+        uniform([0, 0], [CELL * cells[0], 1.0], cells), PERIOD,
+        [body("ring", *thin_ring(x, 0.515625, 0.28, thickness))],
         element=element, scheme="steady", convection=False, mu=0.3, body_force=field(2.0, 0.0),
     )  # fmt: skip
     solve_steady(fluid)

@@ -43,3 +43,18 @@ def test_parts_with_a_common_facet_are_not_divided_if_they_were_two_before():
     assert _divided([{1, 2}, {2, 3}], [{1, 2, 3}]) == {1, 2, 3}
     assert _divided([{1}], [{1}, {4}]) == frozenset()
     assert _divided([], [{1}]) == frozenset()
+
+
+def test_the_start_of_a_step_is_no_iterate():
+    """Nor after a step with joined parts: what is at the start comes back once without being joined."""
+    grid = uniform([0, 0], [2, 1], [20, 10])
+    x, facets = block([0.92, -0.2], [0.95, 0.54])
+    thin = ThinBodies(grid, [body("flap", x, facets, motion=lambda x, t: (x, 0.0 * x))], False, None)
+    thin.sheets(facets, Motion(x, 0.0 * x))
+    for _ in range(2):
+        thin.begin_step()
+        thin._joined, thin._x = {0: frozenset({0})}, None
+        thin.sheets(facets, Motion(x, 0.0 * x))
+        assert thin._tried == []
+        thin.sheets(facets, Motion(x + 0.05, 0.0 * x))
+        assert len(thin._tried) == 1

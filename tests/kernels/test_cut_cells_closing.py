@@ -10,6 +10,7 @@ from cut_scenes import (
     Family,
     all_area,
     assert_same,
+    between_walls,
     block,
     fluid_volume,
     identity_errors,
@@ -25,7 +26,7 @@ from cut_scenes import (
 )
 from fluid_setup import loop
 
-from solvers.cut_cells import components_of, heights
+from solvers.cut_cells import components_of
 
 UPPER, LOWER = block([-0.3, -7, -7], [0, 7, 0.6]), block([0, -7, -0.7], [0.3, 7, 7])
 BLOCKS = block([-0.6, -1, -1], [0, 1, 1]), block([0, -0.5, -1.2], [0.5, 1.3, 0.7])  # touch in 1.5 x 1.7
@@ -123,7 +124,7 @@ def test_plates_part(closing):
             assert (len(table.closed_facet) > 0) == (components == 2)
             error = max(identity_errors(edges, table, facets))
             assert error < 1e-13
-            between = heights(edges, facets, table).between_walls
+            between = between_walls(facets, table)
             thin = between[between < 0.25]  # the plates are as thick as 0.3, the fluid behind them is thicker
             assert (abs(thin - gap * closing) < 1e-13).all()
             assert (len(thin) > 0) == (components == 3)
@@ -148,7 +149,7 @@ def test_a_wedge_closes_up_to_the_length(slope, closing):
         assert table.closed_moments.sum() == pytest.approx(2 * 1.6 * side, rel=1e-6)
         assert components_of(table).count == 1
         assert max(identity_errors(edges, table, facets)) < 4 * closing  # the end of the wedge has no pieces
-        between = heights(edges, facets, table).between_walls
+        between = between_walls(facets, table)
         assert between.min() > 0.9999 * closing
 
 

@@ -281,3 +281,35 @@ def assert_same(one: CutTable, other: CutTable) -> None:
     orders = [np.lexsort(row.T) for row in rows]
     assert (rows[0][orders[0]] == rows[1][orders[1]]).all()
     assert np.abs(one.face_moments[orders[0]] - other.face_moments[orders[1]]).max(initial=0.0) < 1e-14
+
+
+FACING = -0.5  # cosine of the normals of walls that face each other, as for the closing length
+
+
+def between_walls(facets, table):
+    """Smallest gap [m] of each region from the middle of a wall's piece to one that it faces and is over, shape (R,).
+
+    Infinite without walls that face each other. The middle of a piece that is not convex may be beside it, and the gap
+    too small.
+    """
+    regions, walls, region = len(table.cell), table.vertices[facets][table.piece_facet], table.piece_region
+    mean = table.piece_moments.sum(axis=1)
+    middle = np.einsum("pv,pvd->pd", mean, walls) / mean.sum(axis=1, keepdims=True)
+    ways = walls[:, 1:] - walls[:, :1]
+    normal = np.cross(ways[:, 0], ways[:, 1]) if len(table.shape) == 3 else ways[:, 0, ::-1] * [1.0, -1.0]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    count = np.bincount(region, minlength=regions)
+    first = np.cumsum(count) - count
+    repeats = count[region]  # each piece meets all pieces of its region
+    one = np.repeat(np.arange(len(region)), repeats)
+    other = np.arange(len(one)) - np.repeat(np.cumsum(repeats) - repeats, repeats) + np.repeat(first[region], repeats)
+    facing = np.einsum("pd,pd->p", normal[one], normal[other]) < FACING
+    one, other = one[facing], other[facing]
+    way = middle[one] - walls[other, 0]
+    gap = np.einsum("pd,pd->p", way, normal[other])
+    gram = np.einsum("pid,pjd->pij", ways[other], ways[other])
+    at = np.linalg.solve(gram, np.einsum("pid,pd->pi", ways[other], way)[..., None])[..., 0]
+    inside = (gap >= 0.0) & (at >= 0.0).all(axis=1) & (at.sum(axis=1) <= 1.0)
+    between = np.full(regions, np.inf)
+    np.minimum.at(between, region[one[inside]], gap[inside])
+    return between

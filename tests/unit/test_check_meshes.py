@@ -1,5 +1,7 @@
 """`fsci check` reads meshes: what it accepts a run starts with, what it refuses a run refuses with the same words."""
 
+from inspect import unwrap
+
 import meshio  # noqa: TID253
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from case_text import with_section, without
 from fsci import shapes
 from fsci.case import load_case
 from fsci.check.check import summary
-from fsci.check.meshes import check_meshes, thickness
+from fsci.check.meshes import check_meshes, is_hollow, thickness
 from fsci.cli import execute
 from fsci.running.run import FINISHED, run_case
 from solvers.mesh.mesh import Mesh
@@ -182,3 +184,13 @@ def test_thickness(mesh, least):
 
 def test_a_ball_is_as_thick_as_wide():
     assert thickness(shapes.sphere(0.5, [8, 2], order=2)) == pytest.approx(1.0, rel=0.05)
+
+
+def test_what_encloses_a_space_is_hollow():
+    """By the surface of a mesh, and by the names of a shape's surfaces."""
+    assert is_hollow(shapes.ring(1, 2, [12, 2]))
+    assert is_hollow(shapes.hollow_sphere(1, 2, [2, 1], order=2))
+    assert not is_hollow(shapes.ring(1, 2, [12, 2], 300))
+    assert not is_hollow(shapes.tube(1, 2, 1, [12, 1, 2]))
+    for shape, arguments, hollow in (("ring", (1, 2, [12, 2]), True), ("tube", (1, 2, 1, [12, 1, 2]), False)):
+        assert unwrap(getattr(shapes, shape))(*arguments).hollow == hollow

@@ -20,8 +20,7 @@ from scipy.spatial import cKDTree
 
 from solvers.api import Array
 from solvers.fluid.cut.extension import FREE_SHARE
-from solvers.fluid.geometry.pieces import FLUSH
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 
 #: eps, the largest relative contribution of the penalty to a film. Drags are the same to 1.6 % from 3e-3 to 1e-6.

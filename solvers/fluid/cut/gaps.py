@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.cut.film import LEAST_RATIO, Walls, sizes_of, to_faces, to_walls, with_solid
-from solvers.fluid.geometry.pieces import FLUSH
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.fluid.settings.penalties import TRACE, Penalties
 
 #: Height of gaps in cells up to which the whole term acts, and from which on none: 16 % of the flow rate are missing

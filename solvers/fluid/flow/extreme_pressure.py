@@ -21,7 +21,8 @@ from mpi4py import MPI
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid.flow.field import Fluid
-from solvers.fluid.geometry.pieces import FLUSH, place_of
+from solvers.fluid.geometry.pieces import place_of
+from solvers.fluid.grid.box import FLUSH
 from solvers.fluid.terms.closed_contact.zone import SLIVER
 from solvers.mesh.tessellation import area_vectors
 

@@ -20,6 +20,7 @@ from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined
 from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
+from solvers.fluid.geometry.thin.walls import facets_of_walls
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.time_scheme import FlowStep
@@ -53,7 +54,7 @@ class ThinBodies:
         self._wet, self._tied = wetness(surfaces), tied(surfaces)
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
-        self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
+        self._touch = touch
         # what moves with the iterates would touch and part in the course of a step
         self._thin, self._may_close = True, all(body.motion is not None for body in bodies)
         self._possible: bool | None = None if moving else False
@@ -75,7 +76,7 @@ class ThinBodies:
         None if no body has been thin yet, which the first position in a step decides.
         """
         if self._possible is None:
-            self._thin = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
+            self._thin = self._may_be_thin(facets, motion.x)
             self._possible = self._thin or self._may_close
         if not self._possible or (self._searched and not self.follows):
             return self._sheets
@@ -83,8 +84,9 @@ class ThinBodies:
             found = self._find(facets, motion.x)
             if found is not None and self._join_parts(found):
                 found = self._find(facets, motion.x)
-            if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
-                self._tried.append(found)
+            if found is not None and self._first is not None:
+                if not (self._tried and self._tried[-1].same_unknowns(found)):
+                    self._tried.append(found)
             self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
         if self._sheets is not None:
             if self._first is None:
@@ -94,6 +96,14 @@ class ThinBodies:
             if not np.array_equal(self._sheets.closed, self._closed):
                 self._sheets = replace(self._sheets, closed=self._closed)
         return self._sheets
+
+    def _may_be_thin(self, facets: NDArray[np.int64], x: Array) -> bool:
+        grid, most = self._grid, thickest(self._grid.dim)
+        if not self._touch:
+            return may_be_thin(grid, facets[self._wet], x, most)
+        if may_be_thin(grid, facets[self._wet], x, THICK_IN_CONTACT[grid.dim]):
+            return True
+        return may_be_thin(grid, facets[self._wet & facets_of_walls(grid, facets, x)], x, most)
 
     def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
         off = off_boundary(self._grid, x[facets])

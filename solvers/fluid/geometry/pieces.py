@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, Indices
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.mesh.lagrange import lagrange
 
-#: Distance from a plane of the grid, in cells, up to which a piece lies in it.
-FLUSH = 1e-6
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
 #: Rounding error of a position, relative to the largest coordinate of the box: of some sums of rotated coordinates.

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.mesh.mesh import Mesh
 
+#: Distance from a plane of the grid, in cells, up to which something lies in it.
+FLUSH = 1e-6
 #: Names of the box faces: axis and side.
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 #: Steps from the first corner of a cell to each corner, in the order of `Grid.mesh`.

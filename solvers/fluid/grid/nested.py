@@ -20,7 +20,7 @@ from scipy import ndimage
 from solvers import kernels
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices, Mask
-from solvers.fluid.grid.box import CORNER_STEPS, Grid
+from solvers.fluid.grid.box import CORNER_STEPS, FLUSH, Grid
 from solvers.mesh.gauss import gauss
 from solvers.mesh.lagrange import lagrange
 from solvers.mesh.mesh import Mesh
@@ -210,7 +210,7 @@ class RefinedBox:
     def cells(self, grid: Grid) -> Mask:
         inside = np.ones(grid.shape, dtype=bool)
         for axis, (edge, low, high) in enumerate(zip(grid.edges, self.low, self.high, strict=True)):
-            near = 1e-9 * np.diff(edge)
+            near = FLUSH * np.diff(edge)
             along = (edge[1:] > low + near) & (edge[:-1] < high - near)
             inside &= along.reshape([-1 if a == axis else 1 for a in range(grid.dim)])
         return inside.ravel(order="F")

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.fluid.surfaces.surface import ImmersedSurface, Motion, together
 
-#: Winding number above which a point is in a body. Near a concave corner outside of it, it may exceed 0.5.
-INSIDE = 1.0 - 1e-6
+#: Sine of the angle, or of the solid angle, between a point and the plane of a facet up to which it lies in this plane.
+IN_PLANE = 1e-9
+#: Winding number above which a point is in a body, in the planes of up to 1,000 facets. Near a concave corner outside
+#: of it, it may exceed 0.5.
+INSIDE = 1.0 - 1e3 * IN_PLANE
 #: Pairs of a point and a facet that are evaluated together: arrays of some 10 MB.
 PAIRS_AT_ONCE = 100_000
 
@@ -63,5 +66,5 @@ def _angles(way: Array, facets: NDArray[np.int64]) -> Array:
         (a, b, c), (la, lb, lc) = ends, lengths
         across = (a * np.cross(b, c, axis=0)).sum(axis=0)
         along = la * lb * lc + (a * b).sum(axis=0) * lc + (b * c).sum(axis=0) * la + (c * a).sum(axis=0) * lb
-    seen = np.abs(across) > 1e-9 * np.prod(lengths, axis=0)
+    seen = np.abs(across) > IN_PLANE * np.prod(lengths, axis=0)
     return np.where(seen, np.arctan2(across, along), 0.0)

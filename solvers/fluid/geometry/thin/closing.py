@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices, Mask
-from solvers.fluid.geometry.pieces import FLUSH, NOTHING
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.geometry.pieces import NOTHING
+from solvers.fluid.grid.box import FLUSH, Grid
 
 
 def may_touch(grid: Grid, facets: Indices, x: Array) -> bool:

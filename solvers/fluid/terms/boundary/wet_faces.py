@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from solvers import kernels
 from solvers.api import Array
-from solvers.fluid.geometry.pieces import FLUSH
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.fluid.surfaces.surface import Motion
 from solvers.mesh.gauss import gauss
 from solvers.mesh.lagrange import lagrange

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.geometry.pieces import FLUSH
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.mesh.gauss import gauss
 from solvers.mesh.tessellation import unit_normals
 
