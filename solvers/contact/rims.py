@@ -1,0 +1,89 @@
+"""Directions of pressure near the rims of slave surfaces: along the normals of what is opposite.
+
+A slave surface ends at its rim, while a master may go on and rise against its normals n_j. Pressure along n_j would do
+no work where the slave slides up such a rise. Near rims its direction is that of
+
+    a_j = int Phi_j n_m / (n_m . n),   the derivative of the weighted gap with respect to a translation of the masters,
+
+with the normals n_m of the masters. Rims are those of smooth pieces, sharp edges among them. Cuts by planes of symmetry
+are none: there the surface goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.blocks import add_up, block_diagonal, components
+from solvers.contact.law.law import along
+from solvers.contact.mortar import Mortar
+from solvers.contact.patch import Multipliers, SlavePatch
+from solvers.contact.share import Shares
+from solvers.contact.sharp_edges import rims
+from solvers.contact.terms import Normals, Terms
+
+#: Facets between a rim and the last nodes with such a direction. What rises next to a rim tilts the weighted gaps of
+#: the nodes of the first facet, and those of the second by its dual functions: a sliding block makes 0.28 % of the work
+#: with 1, and 0.002 % with 2 as with any more.
+FACETS_FROM_RIM = 2
+
+
+class Rims:
+    """The multipliers near rims, and their directions."""
+
+    def __init__(self, multipliers: Multipliers):
+        self._multipliers = multipliers
+        self._near = np.zeros(len(multipliers.node), dtype=bool)
+        for patch in multipliers.patches:
+            self._near[patch.multipliers[_near_rim(patch)]] = True
+        self._any = bool(self._near.any())
+
+    def turned(
+        self,
+        terms: Terms,
+        normals: Normals,
+        used: Sequence[tuple[Mortar, NDArray[np.int32]]],
+        x: Array,
+        shares: Shares,
+    ) -> Terms:
+        """The terms with these directions in place of normals (collective).
+
+        used: the facet pairs of each mortar that contributed on this process; x: positions [m], shape (N, dim).
+        """
+        if not self._any:
+            return terms
+        C, dim = terms.normals.shape
+        values, parts = np.zeros((C, dim)), []
+        for mortar, facet_pairs in used:
+            patch, rows = mortar.patch, mortar.patch.multipliers
+            near = self._near[rows]
+            mine = facet_pairs[near[mortar.facets].any(axis=1)[facet_pairs[:, 0]]]
+            if len(mine) == 0:
+                continue
+            found, slopes = mortar.rises(x, *normals.at(self._multipliers, patch), mine)
+            keep = near[:, None] * (np.ones((1, dim)) if patch.mask is None else patch.mask)
+            values[rows] += keep * found
+            columns = components(np.concatenate([patch.nodes, mortar.masters.nodes]), dim)
+            parts += [(part.scaled_rows(keep[:, c]), dim * rows + c, columns) for c, part in enumerate(slopes)]
+        values, slopes = shares.total_of(values, add_up(parts, terms.dnormals.shape))
+        size = np.linalg.norm(values, axis=1)
+        turned = size > 0.0
+        unit = np.where(turned[:, None], values, terms.normals) / np.where(turned, size, 1.0)[:, None]
+        turn = along(unit) * np.divide(1.0, size, out=np.zeros_like(size), where=turned)[:, None, None]
+        others = terms.dnormals.scaled_rows((~turned).repeat(dim).astype(float))
+        return replace(terms, normals=unit, dnormals=others + block_diagonal(turn) @ slopes)
+
+
+def _near_rim(patch: SlavePatch) -> NDArray[np.bool_]:
+    """Mask of the nodes of a patch near its rims, shape (n,)."""
+    near = np.zeros(len(patch.nodes), dtype=bool)
+    for nodes in rims(patch.facets, patch.facet_type):
+        cut = patch.mask is not None and (patch.mask[nodes] == 0.0).all(axis=0).any()
+        near[nodes] |= not cut
+    for _ in range(FACETS_FROM_RIM):
+        near[patch.facets[near[patch.facets].any(axis=1)]] = True
+    return near
