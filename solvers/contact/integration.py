@@ -51,7 +51,7 @@ class Integration:
         sliding = [mortar for mortar, law in laws if law.slips]
         N, dim = interface.nodes.points.shape
         self._sliding = Sliding(sliding, by_pair, self._multipliers, self.shares, (N, dim, pairs))
-        self._rims = Rims(self._multipliers)
+        self._rims = Rims(self._multipliers, interface.nodes.points)
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
