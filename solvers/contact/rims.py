@@ -54,7 +54,7 @@ class Rims:
         self._near = np.zeros(len(multipliers.node), dtype=bool)
         self._areas = np.zeros(len(multipliers.node))
         for patch in multipliers.patches:
-            self._near[patch.multipliers[_near_rim(patch)]] = True
+            self._near[patch.multipliers[near_rim(patch)]] = True
             self._areas[patch.multipliers] = integrals_of_nodes(points[patch.nodes], patch.facets, patch.facet_type)
         self._any = bool(self._near.any())
 
@@ -109,7 +109,7 @@ def integrals_of_nodes(points: Array, facets: NDArray[np.int64], facet_type: str
     return found
 
 
-def _near_rim(patch: SlavePatch) -> NDArray[np.bool_]:
+def near_rim(patch: SlavePatch) -> NDArray[np.bool_]:
     """Mask of the nodes of a patch near its rims, shape (n,)."""
     near = np.zeros(len(patch.nodes), dtype=bool)
     for nodes in rims(patch.facets, patch.facet_type):
