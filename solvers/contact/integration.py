@@ -51,7 +51,10 @@ class Integration:
         sliding = [mortar for mortar, law in laws if law.slips]
         N, dim = interface.nodes.points.shape
         self._sliding = Sliding(sliding, by_pair, self._multipliers, self.shares, (N, dim, pairs))
-        self._rims = Rims(self._multipliers, interface.nodes.points)
+        pressed = [
+            patch for patch in self._multipliers.patches if any(mortar.patch is patch for mortar in self._mortars)
+        ]
+        self._rims = Rims(self._multipliers, interface.nodes.points, pressed)
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
@@ -97,6 +100,7 @@ class Integration:
         for mortar in self._mortars:
             mortar.begin_step(x, active)
         self._sliding.begin_step(x, self._travel)
+        self._rims.begin_step(active)
 
     def move(self, dx: Array) -> None:
         """Note that the nodes have moved by dx [m] since the latest iterate, shape (N, dim)."""
