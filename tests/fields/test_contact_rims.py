@@ -81,8 +81,12 @@ def test_directions_have_exact_derivatives(dim, beyond):
     size = contact.nodes.points.shape
     u, change = (rng.uniform(-0.03, 0.03, size) for _ in range(2))
 
+    own = contact.multipliers.patches[0]
     contact.evaluate(u, 0.0)
-    contact.begin_step()  # what is in contact
+    averaged = own.normals((contact.nodes.points + u)[own.nodes])[0]
+    pressed_first = contact.terms.normals[own.multipliers][contact.active_set.active[own.multipliers]]
+    np.testing.assert_allclose(pressed_first, averaged[contact.active_set.active[own.multipliers]], atol=1e-12)
+    contact.begin_step()
 
     def terms(at):
         contact.evaluate(at, 0.0)
@@ -93,8 +97,6 @@ def test_directions_have_exact_derivatives(dim, beyond):
     slope = (now.dnormals @ change.ravel()).reshape(size)
     expected = (terms(u + step * change).normals - terms(u - step * change).normals) / (2 * step)
     np.testing.assert_allclose(slope[near], expected[near], atol=1e-5 * np.abs(expected[near]).max())
-    own = contact.multipliers.patches[0]
-    averaged = own.normals((contact.nodes.points + u)[own.nodes])[0]
     assert np.linalg.norm(now.normals[own.multipliers] - averaged, axis=1).max() > 0.01
 
 
