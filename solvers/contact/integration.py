@@ -17,6 +17,7 @@ from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.tied import Tied
 from solvers.contact.mortar import Mortar
 from solvers.contact.redistribute import redistributed
+from solvers.contact.rims import Rims
 from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Normals, Terms, find_normals, total_terms
@@ -50,6 +51,10 @@ class Integration:
         sliding = [mortar for mortar, law in laws if law.slips]
         N, dim = interface.nodes.points.shape
         self._sliding = Sliding(sliding, by_pair, self._multipliers, self.shares, (N, dim, pairs))
+        pressed = [
+            patch for patch in self._multipliers.patches if any(mortar.patch is patch for mortar in self._mortars)
+        ]
+        self._rims = Rims(self._multipliers, interface.nodes.points, pressed)
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
@@ -95,6 +100,7 @@ class Integration:
         for mortar in self._mortars:
             mortar.begin_step(x, active)
         self._sliding.begin_step(x, self._travel)
+        self._rims.begin_step(active)
 
     def move(self, dx: Array) -> None:
         """Note that the nodes have moved by dx [m] since the latest iterate, shape (N, dim)."""
@@ -138,7 +144,8 @@ class Integration:
             return None
         pieces += self._ties.pieces if shares.comm.rank == 0 else []
         terms = total_terms(pieces, normals, shares, (len(self._interface.pairs), len(z), len(x)))
-        return Integrals(terms, normals, tuple((mortar, found.used) for mortar, found in pieces))
+        used = tuple((mortar, found.used) for mortar, found in pieces)
+        return Integrals(self._rims.turned(terms, normals, used, x, shares), normals, used)
 
     def _near_nodes(self, near: Sequence[NDArray[np.int32]]) -> list[NDArray[np.bool_] | None]:
         """For each patch, mask of the nodes of slave facets that are near; None where a surface is tied."""

@@ -256,14 +256,28 @@ class Mortar:
         self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32]
     ) -> tuple[Array, list[Sparse]]:
         """(int Phi (x_m - x_s) over the used facet pairs, shape (ns, dim); derivatives of each component)."""
+        return self._along_axes(x, normals, dnormals, used)[:2]
+
+    def rises(
+        self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32]
+    ) -> tuple[Array, list[Sparse], Sparse]:
+        """(growth of the weighted gaps as the masters move along each axis, (ns, dim); its derivatives; those of D).
+
+        int Phi n_m / (n_m . n) with the normals n_m of the masters, over the used facet pairs.
+        """
+        values, slopes, last = self._along_axes(x, normals, dnormals, used, rise=True)
+        columns = x.shape[1] * (len(self.patch.nodes) + len(self.masters.nodes))
+        return values, slopes, self._total(last.dD, last.dD_dn, dnormals, len(values), columns)
+
+    def _along_axes(self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32], **settings: Any):
         ns, nm, dim = len(self.patch.nodes), len(self.masters.nodes), x.shape[1]
         values, slopes = np.zeros((ns, dim)), []
+        kept = np.ones(len(used), dtype=np.uint8)
         for axis in range(dim):
-            kept = np.ones(len(used), dtype=np.uint8)
-            result = self._kernel(x, normals, used, kept=kept, along=np.eye(dim)[axis])
+            result = self._kernel(x, normals, used, kept=kept, along=np.eye(dim)[axis], **settings)
             values[:, axis] = result.gap
             slopes.append(self._total(result.dgap, result.dgap_dn, dnormals, ns, dim * (ns + nm)))
-        return values, slopes
+        return values, slopes, result
 
 
 def _widen(matrix: Sparse, columns: int) -> Sparse:

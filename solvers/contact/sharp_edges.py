@@ -41,6 +41,20 @@ def split_nodes(points: Array, facets: Indices, facet_type: str, among: Indices 
     return SplitNodes(split[:, 0], number.reshape(k, n).astype(np.int64))
 
 
+def rims(facets: Indices, facet_type: str) -> Indices:
+    """The nodes of each edge (2D: end) that only one of the facets (k, nodes per facet) has, shape (e, 1 to 3)."""
+    kind = CELL_TYPES[facet_type]
+    local = [[i for i, group in enumerate(kind.nodes) if set(group) <= set(edge)] for edge in _edges(kind.corners)]
+    edges = np.concatenate([facets[:, own] for own in local])
+    _, number, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return edges[count[number.ravel()] == 1]
+
+
+def _edges(corners: int) -> list[tuple[int, ...]]:
+    """The corners of each edge of a facet (2D: end)."""
+    return [(0,), (1,)] if corners == 2 else [(c, (c + 1) % corners) for c in range(corners)]
+
+
 def _corner_normals(points: Array, facets: Indices, facet_type: str) -> Array:
     """Unit normals of every facet at each of its nodes, shape (k * nodes per facet, dim)."""
     alone = np.arange(facets.size).reshape(facets.shape)
@@ -51,10 +65,8 @@ def _corner_normals(points: Array, facets: Indices, facet_type: str) -> Array:
 def _across_edges(facets: Indices, facet_type: str) -> tuple[Indices, Indices]:
     """Pairs of local nodes, facet * nodes per facet + number, that are the same node of a common edge (2D: end)."""
     k, n = facets.shape
-    corners = CELL_TYPES[facet_type].corners
-    edges = [(0,), (1,)] if corners == 2 else [(c, (c + 1) % corners) for c in range(corners)]
     keys, nodes, entries = [], [], []
-    for edge in edges:
+    for edge in _edges(CELL_TYPES[facet_type].corners):
         for local, group in enumerate(CELL_TYPES[facet_type].nodes):
             if set(group) <= set(edge):
                 keys.append(np.sort(facets[:, edge], axis=1))

@@ -111,12 +111,13 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
 MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& type_s, const Reals& xm, const Facets& fm,
                        const std::string& type_m, const Reals& normals, const Pairs& pairs,
                        const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near, double facing,
-                       const std::optional<Flags>& kept, const std::optional<Direction>& along, bool own) {
+                       const std::optional<Flags>& kept, const std::optional<Direction>& along, bool rise, bool own) {
     require(method == "segments" || method == "elements", "method must be 'segments' or 'elements'");
     require(xs.shape(1) == xm.shape(1), "slave and master must have the same dimension");
     require(pairs.shape(1) == 2, "pairs must have shape (p, 2)");
     require(!kept || kept->shape(0) == pairs.shape(0), "kept must have one entry for each pair");
     require(!along || along->shape(0) == xs.shape(1), "along must have as many entries as there are dimensions");
+    require(along || !rise, "rise needs along");
     check_nodal("normals", normals, xs);
     if (z) check_nodal("z", *z, xs);
     const int dim = static_cast<int>(xs.shape(1));
@@ -130,7 +131,7 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
     }
     const MortarInput input{xs.data(), xm.data(), normals.data(), z ? z->data() : nullptr, fs.data(), fm.data(),
                             n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near, facing,
-                            kept ? kept->data() : nullptr, along ? along->data() : nullptr};
+                            kept ? kept->data() : nullptr, along ? along->data() : nullptr, rise};
     MortarResult result;
     dispatch(type_s, dim, [&](auto slave) {
         using Slave = decltype(slave);
@@ -219,7 +220,7 @@ void bind_mortar(nb::module_& module) {
     module.def("mortar", &py_mortar, "xs"_a, "fs"_a, "facet_type_s"_a, "xm"_a, "fm"_a, "facet_type_m"_a, "normals"_a,
                "pairs"_a, "z"_a = nb::none(), nb::kw_only(), "method"_a = "segments", "derivatives"_a = true,
                "reach"_a = std::numeric_limits<double>::infinity(), "near"_a = std::numeric_limits<double>::infinity(), "facing"_a = -0.2,
-               "kept"_a = nb::none(), "along"_a = nb::none(), "own"_a = false,
+               "kept"_a = nb::none(), "along"_a = nb::none(), "rise"_a = false, "own"_a = false,
                "Mortar integrals between a slave and a master surface.\n\n"
                "xs (ns, dim), xm (nm, dim): current positions; fs, fm: facets, oriented outward, of types line2, line3 "
                "(2D), tri3, tri6, quad4, quad9 (3D), VTK node order; normals (ns, dim) of the slave; pairs (p, 2): "
@@ -228,5 +229,6 @@ void bind_mortar(nb::module_& module) {
                "facet); reach: facets farther apart than this do not see each other; near: slave facets to which no master is as near as "
                "this are left out; facing: facets see each other if the product of their unit normals is below; kept "
                "(p,) of 0 and 1: pairs for which none of these three is asked; along (dim,): unit vector along which gaps are measured "
-               "instead of the normals; own: also compute W.");
+               "instead of the normals; rise: instead of gaps, by how much those along the normals grow as the masters move in that direction; "
+               "own: also compute W.");
 }

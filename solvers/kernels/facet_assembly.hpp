@@ -34,6 +34,7 @@ struct MortarInput {
     double facing;  // facets see each other if the product of their normals is below
     const std::uint8_t* kept;  // pairs that take part whatever reach, near and facing are; may be null
     const double* along;       // fixed unit vector along which gaps are measured instead of the normals; may be null
+    bool rise;                 // by how much gaps grow as the masters move along that vector, instead of gaps
 
     bool is_kept(std::size_t pair) const { return kept && kept[pair]; }
 };
@@ -80,6 +81,7 @@ class FacetAssembly {
         gather(in_.slave_facets + std::size_t(facet) * n, in_.slave_x, slave_nodes_, slave_.x);
         gather(in_.slave_facets + std::size_t(facet) * n, in_.normals, slave_nodes_, slave_.normal);
         slave_.along = in_.along;
+        slave_.rise = in_.rise;
         integrate(first, last);
         if (pairs_.empty()) return;
 

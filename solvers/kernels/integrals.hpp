@@ -32,6 +32,39 @@ template <typename Facet>
 struct FacetNodes {
     double x[Facet::nodes][Facet::dim], normal[Facet::nodes][Facet::dim];
     const double* along = nullptr;
+    bool rise = false;  // instead of the gap, by how much it grows as the master moves in that direction
+};
+
+// m.e / (m.n) with the master's normal m = x_m,1 x x_m,2 at a point in 3D, and its derivatives; nothing without e.
+template <typename Master>
+struct MasterRise {
+    double value = 0.0, turn[3] = {}, slope[2] = {}, by_node[Master::nodes][3] = {};  // by n, by xi, by the nodes
+
+    template <typename T>
+    MasterRise(const double* e, const double* n, const SurfacePoint<Master>& xm,
+               const FacetNodes<Master>& nodes, const PointOn<Master, T>& at) {
+        if (!e) return;
+        double m[3], by_m[3], along[2][3];
+        cross(xm.tangent[0], xm.tangent[1], m);
+        const double inverse = 1.0 / dot(m, n);
+        value = dot(m, e) * inverse;
+        for (int c = 0; c < 3; ++c) {
+            by_m[c] = (e[c] - value * n[c]) * inverse;
+            turn[c] = -value * inverse * m[c];
+        }
+        cross(xm.tangent[1], by_m, along[0]);  // by each tangent
+        cross(by_m, xm.tangent[0], along[1]);
+        for (int l = 0; l < Master::nodes; ++l)
+            for (int c = 0; c < 3; ++c) by_node[l][c] = at.dN[0][l] * along[0][c] + at.dN[1][l] * along[1][c];
+
+        using Local = Dual<2>;
+        Local xi[2], N[Master::nodes], dN[2][Master::nodes];
+        for (int a = 0; a < 2; ++a) xi[a] = Local::variable(value_of(at.xi[a]), a);
+        Master::shape(xi, N, dN);
+        for (int a = 0; a < 2; ++a)
+            for (int b = 0; b < 2; ++b)
+                for (int l = 0; l < Master::nodes; ++l) slope[a] += dN[b][l].gradient[a] * dot(along[b], nodes.x[l]);
+    }
 };
 
 template <typename Slave, typename Master, typename T>
@@ -62,10 +95,13 @@ struct PairIntegrals {
         const double length = std::sqrt(dot(field.x, field.x));
         double normal[3] = {field.x[0] / length, field.x[1] / length, field.x[2] / length};
         const double r[3] = {xm.x[0] - xs.x[0], xm.x[1] - xs.x[1], xm.x[2] - xs.x[2]};
-        if (slave.along) std::copy_n(slave.along, 3, normal);
-        const double g = dot(normal, r);
+        const MasterRise<Master> rise(slave.rise ? slave.along : nullptr, normal, xm, master, on_master);
+        if (slave.along && !slave.rise) std::copy_n(slave.along, 3, normal);
+        const double g = slave.rise ? rise.value : dot(normal, r);
         double turn[3] = {};  // dg/dn_h
-        if (!slave.along)
+        if (slave.rise)
+            for (int c = 0; c < 3; ++c) turn[c] = (rise.turn[c] - dot(rise.turn, normal) * normal[c]) / length;
+        else if (!slave.along)
             for (int c = 0; c < 3; ++c) turn[c] = (r[c] - g * normal[c]) / length;
 
         T test[n], N_master[m], gap_point = g;
@@ -76,9 +112,9 @@ struct PairIntegrals {
             N_master[l] = chain(on_master.N[l], on_master.dN[0][l], on_master.dN[1][l], on_master.xi);
         if constexpr (is_dual<T>)
             for (int a = 0; a < 2; ++a) {
-                gap_point.gradient.add(dot(turn, field.tangent[a]) - dot(normal, xs.tangent[a]),
-                                       on_slave.xi[a].gradient);
-                gap_point.gradient.add(dot(normal, xm.tangent[a]), on_master.xi[a].gradient);
+                const double by_slave = slave.rise ? 0.0 : -dot(normal, xs.tangent[a]);
+                gap_point.gradient.add(dot(turn, field.tangent[a]) + by_slave, on_slave.xi[a].gradient);
+                gap_point.gradient.add(slave.rise ? rise.slope[a] : dot(normal, xm.tangent[a]), on_master.xi[a].gradient);
             }
         add(test, N_master, weight, gap_point);
         cover += (1.0 / Slave::size) * weight;
@@ -87,11 +123,12 @@ struct PairIntegrals {
             double along_slave[3 * n], along_normal[3 * n], along_master[3 * m];
             for (int i = 0; i < n; ++i)
                 for (int c = 0; c < 3; ++c) {
-                    along_slave[3 * i + c] = -on_slave.N[i] * normal[c];
+                    along_slave[3 * i + c] = slave.rise ? 0.0 : -on_slave.N[i] * normal[c];
                     along_normal[3 * i + c] = on_slave.N[i] * turn[c];
                 }
             for (int l = 0; l < m; ++l)
-                for (int c = 0; c < 3; ++c) along_master[3 * l + c] = on_master.N[l] * normal[c];
+                for (int c = 0; c < 3; ++c)
+                    along_master[3 * l + c] = slave.rise ? rise.by_node[l][c] : on_master.N[l] * normal[c];
             for (int k = 0; k < n; ++k) {
                 const double weighted = test[k].value * weight.value;
                 for (int i = 0; i < 3 * n; ++i) gap_slave[k][i] += weighted * along_slave[i];
@@ -108,6 +145,13 @@ struct PairIntegrals {
         const FieldPoint<Slave, T> xs(pair.slave, point.slave), normal(pair.normal, point.slave);
         const FieldPoint<Master, T> xm(pair.master, point.master);
         T g = 0.0, square = 0.0;
+        if (slave.rise) {
+            const T along[2] = {slave.along[0], slave.along[1]};
+            const T length = square_root(normal.value[0] * normal.value[0] + normal.value[1] * normal.value[1]);
+            add(test, N_master, point.weight, length * cross(along, xm.slope) / cross(normal.value, xm.slope));
+            cover += point.cover;
+            return;
+        }
         for (int c = 0; c < 2; ++c) {
             const T along = slave.along ? T(slave.along[c]) : normal.value[c];
             add_product(g, along, xm.value[c] - xs.value[c]);
