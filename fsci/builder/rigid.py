@@ -24,6 +24,7 @@ from solvers.rigid.body import PointLoad, PointSpring, RigidBody, hinged
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface, without_inertia
 from solvers.rigid.line_springs import LineSpring
+from solvers.spring_law import SpringLaw
 from solvers.timing import Timer
 
 
@@ -99,7 +100,7 @@ def _line_springs(settings: Mapping[str, FreeMotion]) -> Iterator[LineSpring]:
             other = None if end.body is None else numbers[end.body]
             k = spring.stiffness[0]
             damping = spring.damping * k + spring.dashpot
-            yield LineSpring(numbers[name], spring.at, other, end.at, k, damping, spring.free_length)
+            yield LineSpring(numbers[name], spring.at, other, end.at, SpringLaw(k, damping, spring.free_length))
 
 
 def _load(load: RigidLoadSection) -> PointLoad:
