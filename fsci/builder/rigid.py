@@ -24,7 +24,6 @@ from solvers.rigid.body import PointLoad, PointSpring, RigidBody, hinged
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface, without_inertia
 from solvers.rigid.line_springs import LineSpring
-from solvers.spring_law import SpringLaw
 from solvers.timing import Timer
 
 
@@ -33,7 +32,7 @@ def build_free_bodies(case: Case, comm: MPI.Comm, timer: Timer) -> RigidBodies:
     settings = case.rigid or {}
     bodies = [_body(case, name, free, comm) for name, free in settings.items()]
     contact = build_rigid_contact(case, bodies, build_rigid_bodies(case, comm), comm)
-    springs = list(_line_springs(settings))
+    springs = list(_line_springs(case, settings))
     return RigidBodies(
         bodies, _scheme(case), build_tolerance(case), springs=springs, contact=contact, timer=timer, comm=comm
     )
@@ -90,17 +89,15 @@ def _point_spring(spring: PointSpringSection) -> PointSpring:
     return PointSpring(spring.at, stiffness, spring.damping, spring.dashpot)
 
 
-def _line_springs(settings: Mapping[str, FreeMotion]) -> Iterator[LineSpring]:
-    """Springs to other points, each once."""
+def _line_springs(case: Case, settings: Mapping[str, FreeMotion]) -> Iterator[LineSpring]:
+    """Springs to points of other rigid bodies and at rest, each once."""
     numbers = {name: index for index, name in enumerate(settings)}
     for name, free in settings.items():
         for spring in free.springs:
-            if (end := spring.to) is None:
+            if (end := spring.to) is None or end.body in case.elastic_bodies:
                 continue
             other = None if end.body is None else numbers[end.body]
-            k = spring.stiffness[0]
-            damping = spring.damping * k + spring.dashpot
-            yield LineSpring(numbers[name], spring.at, other, end.at, SpringLaw(k, damping, spring.free_length))
+            yield LineSpring(numbers[name], spring.at, other, end.at, spring.law())
 
 
 def _load(load: RigidLoadSection) -> PointLoad:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,13 @@ class LineSpring:
     other: int | PointMotion | None
     to: Sequence[float]  #: the second point at the start [m], shape (dim,)
     law: SpringLaw
+
+
+class MovingBodies(Protocol):
+    """Bodies at present; `RigidBodies` is one."""
+
+    bodies: list[RigidBody]
+    now: list[RigidInstant]
 
 
 @dataclass(frozen=True)
@@ -80,9 +88,7 @@ def tangent(
         for end, row, sign in signed:
             by_place = _by_place(end)
             for other, column, other_sign in signed:
-                place = _by_place(other)
-                speed = place @ rates[column]
-                speed[:, 3:] -= skew(other.turning) @ skew(other.arm)
+                place, speed = _by_motion(other, rates[column])
                 block = sign * other_sign * by_place.T @ (by_d @ place + by_rate @ speed)
                 if other is end:
                     block[3:, 3:] += sign * skew(force) @ skew(end.arm)
@@ -96,9 +102,31 @@ def tangent(
     return sparse_from_entries(row, column, entry, (len(free), len(free)))
 
 
+def point_motion(field: MovingBodies, index: int, at: Sequence[float]) -> tuple[Array, Array]:
+    """Position [m] and velocity [m/s] of a point of a body at present, each of shape (3,)."""
+    end = _end(index, at, field.bodies, field.now)
+    return end.x, end.v
+
+
+def by_unknowns(field: MovingBodies, index: int, at: Sequence[float], rate: Array) -> tuple[Array, Array]:
+    """Derivatives of position and velocity of a point by the six unknowns of its body, each of shape (3, 6).
+
+    rate: that of the velocities of the body by the same.
+    """
+    return _by_motion(_end(index, at, field.bodies, field.now), rate)
+
+
 def _by_place(end: _End) -> Array:
     """Derivative of the place of an end by the unknowns of its body, shape (3, 6)."""
     return np.hstack([np.eye(3), -skew(end.arm)])
+
+
+def _by_motion(end: _End, rate: Array) -> tuple[Array, Array]:
+    """The same, and that of its velocity; rate: of the velocities of the body."""
+    place = _by_place(end)
+    speed = place @ rate
+    speed[:, 3:] -= skew(end.turning) @ skew(end.arm)
+    return place, speed
 
 
 def _ends(spring: LineSpring, bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]) -> tuple[_End, _End]:

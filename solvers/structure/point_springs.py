@@ -103,6 +103,11 @@ class PointSprings:
         u, v = (np.pad(weights @ values, (0, 3 - dim)) for values in (u, v))
         return Place(dofs, weights, at + u, v, rate)
 
+    def motion(self, structure: SprungStructure, spring: int, side: int) -> tuple[Array, Array]:
+        """Position [m] and velocity [m/s] of an end, for other fields (collective)."""
+        place = self.place(structure, spring, side)
+        return place.x, place.v
+
     def places(
         self, structure: SprungStructure, slope: Array | None = None
     ) -> Iterator[tuple[SpringLaw, Place, Place]]:
