@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from fsci.case import Case
 from fsci.case.free_body import PointSpringSection
 from fsci.case.yaml_text import Keys
-from solvers.structure.point_springs import PointSpring, SpringEnd
+from solvers.structure.point_springs import SpringBetween, SpringEnd
 
 if TYPE_CHECKING:
     from solvers.rigid.field import RigidBodies
 
 
-def point_springs(case: Case, rigid: RigidBodies | None) -> list[tuple[tuple[Keys, Keys], PointSpring]]:
+def point_springs(case: Case, rigid: RigidBodies | None) -> list[tuple[tuple[Keys, Keys], SpringBetween]]:
     """All springs with an end on an elastic body, after the places of both ends in the case."""
     found = []
     for name, body in case.elastic_bodies.items():
@@ -32,10 +32,10 @@ def point_springs(case: Case, rigid: RigidBodies | None) -> list[tuple[tuple[Key
 
 def _spring(
     case: Case, name: str, spring: PointSpringSection, keys: Keys, rigid: RigidBodies | None
-) -> tuple[tuple[Keys, Keys], PointSpring]:
+) -> tuple[tuple[Keys, Keys], SpringBetween]:
     assert spring.to is not None
     ends = _end(case, name, spring.at, rigid), _end(case, spring.to.body, spring.to.at, rigid)
-    return ((*keys, "at"), (*keys, "to", "at")), PointSpring(ends, spring.law())
+    return ((*keys, "at"), (*keys, "to", "at")), SpringBetween(ends, spring.law())
 
 
 def _end(case: Case, name: str | None, at: Sequence[float], rigid: RigidBodies | None) -> SpringEnd:

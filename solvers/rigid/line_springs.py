@@ -32,7 +32,7 @@ class LineSpring:
     law: SpringLaw
 
 
-class MovingBodies(Protocol):
+class BodiesNow(Protocol):
     """Bodies at present; `RigidBodies` is one."""
 
     bodies: list[RigidBody]
@@ -102,13 +102,13 @@ def tangent(
     return sparse_from_entries(row, column, entry, (len(free), len(free)))
 
 
-def point_motion(field: MovingBodies, index: int, at: Sequence[float]) -> tuple[Array, Array]:
+def point_motion(field: BodiesNow, index: int, at: Sequence[float]) -> tuple[Array, Array]:
     """Position [m] and velocity [m/s] of a point of a body at present, each of shape (3,)."""
     end = _end(index, at, field.bodies, field.now)
     return end.x, end.v
 
 
-def by_unknowns(field: MovingBodies, index: int, at: Sequence[float], rate: Array) -> tuple[Array, Array]:
+def by_unknowns(field: BodiesNow, index: int, at: Sequence[float], rate: Array) -> tuple[Array, Array]:
     """Derivatives of position and velocity of a point by the six unknowns of its body, each of shape (3, 6).
 
     rate: that of the velocities of the body by the same.

@@ -29,7 +29,7 @@ from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.inertia import ElasticInertia
 from solvers.structure.instant import Instant
-from solvers.structure.point_springs import PointSpring, PointSprings
+from solvers.structure.point_springs import PointSprings, SpringBetween
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -52,7 +52,7 @@ class Structure:
         *,
         contact: Constraint | None = None,
         exchanges_mass: bool = False,
-        springs: Sequence[PointSpring] = (),
+        springs: Sequence[SpringBetween] = (),
         timer: Timer | None = None,
     ):
         """exchanges_mass: surfaces lose their mass only while their contact pairs are near, else for good."""

@@ -43,7 +43,7 @@ class SpringEnd:
 
 
 @dataclass(frozen=True)
-class PointSpring:
+class SpringBetween:
     """A spring and a damper between two points."""
 
     ends: tuple[SpringEnd, SpringEnd]
@@ -51,7 +51,7 @@ class PointSpring:
 
 
 @dataclass(frozen=True)
-class Place:
+class EndPlace:
     """The end of a spring at present; of a point that this field does not move without nodes."""
 
     dofs: NDArray[np.int64]  #: global, shape (k, dim)
@@ -78,7 +78,7 @@ class SprungStructure(MovingStructure, Protocol):
 class PointSprings:
     """All springs of a structure."""
 
-    def __init__(self, springs: Sequence[PointSpring], bodies: Sequence[Body], layout: Layout):
+    def __init__(self, springs: Sequence[SpringBetween], bodies: Sequence[Body], layout: Layout):
         """Raises SpringOutside (collective)."""
         self.springs = list(springs)
         self._nodes = [
@@ -86,14 +86,14 @@ class PointSprings:
             for number, spring in enumerate(springs)
         ]
 
-    def place(self, structure: SprungStructure, spring: int, side: int, slope: Array | None = None) -> Place:
+    def place(self, structure: SprungStructure, spring: int, side: int, slope: Array | None = None) -> EndPlace:
         """Where an end is; slope: derivative of the velocity of owned dofs, None: zero (collective)."""
         end, nodes, dim = self.springs[spring].ends[side], self._nodes[spring][side], structure.dim
         at = np.pad(np.asarray(end.at, dtype=float), (0, 3 - dim))
         if nodes is None:
             none = np.empty((0, dim))
             x, v = (at, np.zeros(3)) if end.motion is None else end.motion()
-            return Place(none.astype(np.int64), none[:, 0], x, v, none)
+            return EndPlace(none.astype(np.int64), none[:, 0], x, v, none)
         dofs, weights = nodes
         own = np.zeros(structure.layout.size) if slope is None else slope
         u, v, rate = (
@@ -101,7 +101,7 @@ class PointSprings:
             for values in (structure.now.u, structure.now.v, own)
         )
         u, v = (np.pad(weights @ values, (0, 3 - dim)) for values in (u, v))
-        return Place(dofs, weights, at + u, v, rate)
+        return EndPlace(dofs, weights, at + u, v, rate)
 
     def motion(self, structure: SprungStructure, spring: int, side: int) -> tuple[Array, Array]:
         """Position [m] and velocity [m/s] of an end, for other fields (collective)."""
@@ -110,7 +110,7 @@ class PointSprings:
 
     def places(
         self, structure: SprungStructure, slope: Array | None = None
-    ) -> Iterator[tuple[SpringLaw, Place, Place]]:
+    ) -> Iterator[tuple[SpringLaw, EndPlace, EndPlace]]:
         """The law and both ends of all springs, as `place`."""
         for number, spring in enumerate(self.springs):
             yield spring.law, self.place(structure, number, 0, slope), self.place(structure, number, 1, slope)

@@ -14,7 +14,7 @@ from solvers.structure.body import Body, Support
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
-from solvers.structure.point_springs import PointSpring, SpringEnd, SpringOutside
+from solvers.structure.point_springs import SpringBetween, SpringEnd, SpringOutside
 from solvers.structure.time_scheme import Statics
 
 STIFF = NeoHooke(8e5, 12e5, 2.0)
@@ -31,9 +31,9 @@ def body(name, mesh, material=STIFF, **settings) -> Body:
     return Body(name, mesh, material, **settings, comm=MPI.COMM_SELF)
 
 
-def spring(first, second, stiffness=50.0, damping=0.0, length=0.0) -> PointSpring:
+def spring(first, second, stiffness=50.0, damping=0.0, length=0.0) -> SpringBetween:
     ends = tuple(SpringEnd(name, at) for name, at in (first, second))
-    return PointSpring(ends, SpringLaw(stiffness, damping, length))
+    return SpringBetween(ends, SpringLaw(stiffness, damping, length))
 
 
 def mean(structure, index):
