@@ -15,6 +15,7 @@ from fsci.builder.rigid_contact import build_rigid_contact
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.free_body import HELD, FreeMotion, PointSpringSection, RigidDynamics, RigidLoadSection
+from fsci.case.values import value_of
 from fsci.expression import Expression
 from fsci.meshes.of_case import require_inside_period
 from solvers.api import Array
@@ -69,7 +70,7 @@ def _body(case: Case, name: str, settings: FreeMotion, comm: MPI.Comm) -> RigidB
         points,
         facets,
         inertia,
-        gravity=settings.gravity,
+        gravity=None if settings.gravity is None else [value_of(one) for one in settings.gravity],
         springs=[_point_spring(spring) for spring in settings.springs if spring.to is None],
         loads=[_load(load) for load in settings.loads],
         held={way: _not_at_all for word in settings.held for way in HELD[word]},
