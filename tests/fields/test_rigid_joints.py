@@ -295,3 +295,21 @@ def test_the_tangent_against_finite_differences(dim, length):
         step = h * np.eye(2 * n)[column]
         found = (balance(step) - balance(-step)) / (2.0 * h)
         assert found[free] == pytest.approx(tangent[free, column], rel=1e-6, abs=1e-6)
+
+
+def test_an_oblique_hinge_is_a_pivot_and_a_joint_on_its_axis():
+    """A door under gravity, as one on an upright axis that is turned with everything else."""
+    points, axis = np.array([0.0, -0.1, 0.0]) + CUBE * [1.0, 0.2, 2.0], (1.0, 0.5, 0.3)
+    weight, swings = np.array([2.0, -6.0, -3.0]), []
+    held = {"rotation_x": lambda t: 0.0, "rotation_y": lambda t: 0.0}
+    for angle in (0.0, 1.1):
+        x, g = turned(points, axis, angle), turned(weight[None], axis, angle)[0]
+        body = RigidBody("door", x, SIDES, inertia_of_surface(x, SIDES, 3.0), gravity=g, held={} if angle else held)
+        top = turned(np.array([[0.0, 0.0, 2.0]]), axis, angle)[0]
+        joint = [LineSpring(0, top, None, top, SpringLaw(1e9, 1e6, 0.0))] if angle else []
+        bodies = field(hinged(body, (0.0, 0.0, 0.0)), springs=joint, rho_inf=0.8)
+        for _ in march(bodies, 1.0, 50):
+            pass
+        swings.append(turned(bodies.displacement(), axis, -angle))
+    assert np.abs(swings[0]).max() > 0.5
+    assert swings[1] == pytest.approx(swings[0], abs=1e-6)
