@@ -100,7 +100,7 @@ SMALL = (
     ONE.replace("to: [1, 1.5]", "to: [0.001, 0.0015]")
     .replace("radius: 0.15", "radius: 0.00015")
     .replace("[0.5, 0.4]", "[0.0005, 0.0004]")
-    .replace("viscosity: 0.05", "viscosity: 5.0e-5")
+    .replace("viscosity: 0.05", "viscosity: 5.0e-8")
     .replace("[0, -10]", "[0, -0.01]")
 )
 
@@ -119,7 +119,8 @@ FLOORS = {
     "half of the step": (ONE.replace("step: 0.02, end: 1.5", "step: 0.01, end: 0.6"), "y", 0.15, 24),
     "a thousandth of the size": (SMALL, "y", 0.00015, 24),
     "sideways": (ONE.replace("gravity: [0, -10]", "gravity: [-10, 0]"), "x", 0.15, 24),
-    "in space": (BALL, "z", 0.15, 12),
+    # the facets of the ball are 0.936 radii from its centre, those of an octagon 0.924
+    "in space": (BALL, "z", 0.15, 8),
 }
 
 
