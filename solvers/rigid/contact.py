@@ -187,7 +187,7 @@ class RigidContact:
         near, touch = self.near[self.active], self.touch[self.active]
         assert self._moment is not None
         given = near.in_frame(near.given) / self._moment.dt + self._of_all(near).motion(without) - touch.motion(without)
-        return Closed(near, touch, self._moment, mass, given, force, gyroscopic)
+        return Closed(near, touch, self.z[self.active], self._moment, mass, given, force, gyroscopic)
 
     def _of_all(self, near: Near) -> Touch:
         """Relative motions by all unknowns, those that are held, too."""
