@@ -274,3 +274,39 @@ def test_a_case_with_springs_runs(tmp_path):
     (tmp_path / "case.yaml").write_text(HANGING)
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
     assert read_history(tmp_path / "out" / "history.csv")["wall.y"][-1] == pytest.approx(20.0, rel=1e-8)
+
+
+#: A stamp lies on an elastic plate, and a spring from an elastic beam above takes a part of its weight.
+PRESSED = """\
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    plate:
+      mesh: {shape: rectangle, size: [2, 0.4], origin: [-1, -0.4], cells: [12, 3]}
+      material: {law: neo_hooke, E: 2e4, nu: 0.3}
+      supports: [{on: bottom, displacement: [0, 0]}]
+    beam:
+      mesh: {shape: rectangle, size: [2, 0.4], origin: [-1, 2], cells: [8, 2]}
+      material: {law: neo_hooke, E: 2e4, nu: 0.3}
+      supports: [{on: left, displacement: [0, 0]}]
+      point_springs: [{at: [0.03, 2], stiffness: 30, to: {body: stamp, at: [0.03, 1]}, length: 0.7}]
+rigid:
+  gravity: [0, -10]
+  bodies:
+    stamp: {mesh: {shape: rectangle, size: [1, 1], origin: [-0.5, 0], cells: [1, 1]}, density: 2, held: [x]}
+contact: {pairs: {press: {slave: {body: plate, on: top}, master: {obstacle: stamp}}}}
+output: {fields_every: 0}
+solver: {newton: {residual: 1e-11}}
+"""
+
+
+def test_contact_carries_what_the_spring_does_not(tmp_path):
+    """Weight 20 less the pull of the spring, whose ends both give way."""
+    composite = simulation(PRESSED, tmp_path).scheme
+    for _, info in march(composite, 1.0, 1):
+        pass
+    pull = -pulls(composite)[0][1]
+    assert 7.0 < pull < 30.0 * 0.3  # the beam comes down
+    pressed = composite.rigid.pressed[1]
+    assert pressed + pull == pytest.approx(20.0, abs=1e-8)
+    assert abs(info.numbers["contact.press.y"]) == pytest.approx(pressed, rel=1e-9)
