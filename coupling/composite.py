@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from coupling.elastic import Elastic
 from coupling.free_masters import FreeMasters
 from coupling.ports import Solid
+from coupling.rigid_springs import RigidSprings
 from solvers.algebra.added_product import with_product
 from solvers.algebra.blocks import block_diagonal
 from solvers.algebra.lagged import LaggedFactors
@@ -43,6 +44,7 @@ class Composite:
         self.size = elastic.size + rigid.size
         self.surfaces = elastic.surfaces | rigid.surfaces
         self._vertices = sum(len(points) for points in elastic.surfaces.values())
+        self._springs = RigidSprings(elastic.structure, rigid)
         self._known: Constraint | None = None  #: the constraint that `_masters` belongs to
         self._masters: FreeMasters | None = None
         self._factors = LaggedFactors(self.comm, fresh=math.inf)
@@ -65,6 +67,8 @@ class Composite:
     def initialise(self, t: float, dt: float) -> None:
         self.rigid.initialise(t, dt)
         self.elastic.initialise(t, dt)
+        if self._springs.any:  # whose forces need the motion of the elastic bodies
+            self.rigid.initialise(t, dt)
 
     def step(self, t: float, dt: float) -> StepInfo:
         """One step from t to t + dt without a flow. Raises StepFailed."""
@@ -83,8 +87,8 @@ class Composite:
         self.elastic.predict(t)
 
     def solve(self) -> StepInfo:
-        """Solve both parts: together if they may touch, else one after the other."""
-        if self._find_masters() is not None:
+        """Solve both parts: together if they may touch or springs join them, else one after the other."""
+        if self._find_masters() is not None or self._springs.any:
             structure = self.elastic.structure
             if structure.constraint is not None:
                 structure.constraint.begin_solve()
@@ -165,6 +169,7 @@ class Composite:
         of_elastic = self.elastic.residual()
         if (masters := self._find_masters()) is not None:
             masters.press(self.elastic.force_weight)
+        self._springs.follow()
         self._residuals = [of_elastic, self.rigid.residual()]
         return np.concatenate(self._residuals)
 
@@ -172,7 +177,7 @@ class Composite:
         return np.concatenate([part.forces() for part in self.parts])
 
     def linearise(self) -> PETSc.Mat:
-        return block_diagonal([part.linearise() for part in self.parts])
+        return self._springs.added_to(block_diagonal([part.linearise() for part in self.parts]))
 
     def added_product(self) -> Callable[[Array], Array] | None:
         product, own = self.elastic.added_product(), self.elastic.size

@@ -115,7 +115,7 @@ def _structure_and_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation
 
     rigid, bodies = build_free_bodies(case, comm, timer), build_bodies(case, comm)
     contact = _contact(case, comm, bodies, rigid)
-    structure = build_structure(case, comm, bodies, contact, timer)
+    structure = build_structure(case, comm, bodies, contact, timer, rigid)
     scheme = Composite(Elastic(structure, ()), rigid)
     probes = [
         build_probes(case, "structure", STRUCTURE_PROBES, structure),
@@ -192,7 +192,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
     bodies = build_structure.build_bodies(case, comm)
     contact = _contact(case, comm, bodies, rigid)
-    structure = build_structure.build_structure(case, comm, bodies, contact, timer)
+    structure = build_structure.build_structure(case, comm, bodies, contact, timer, rigid)
     scheme, fluid = build_coupled(case, comm, bodies, structure, timer, rigid)
     coupled = scheme.coupled
     watched = WatchedFlow(fluid)

@@ -15,6 +15,7 @@ from fsci.builder.rigid_contact import build_rigid_contact
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.free_body import HELD, FreeMotion, PointSpringSection, RigidDynamics, RigidLoadSection
+from fsci.case.values import value_of
 from fsci.expression import Expression
 from fsci.meshes.of_case import require_inside_period
 from solvers.api import Array
@@ -32,7 +33,7 @@ def build_free_bodies(case: Case, comm: MPI.Comm, timer: Timer) -> RigidBodies:
     settings = case.rigid or {}
     bodies = [_body(case, name, free, comm) for name, free in settings.items()]
     contact = build_rigid_contact(case, bodies, build_rigid_bodies(case, comm), comm)
-    springs = list(_line_springs(settings))
+    springs = list(_line_springs(case, settings))
     return RigidBodies(
         bodies, _scheme(case), build_tolerance(case), springs=springs, contact=contact, timer=timer, comm=comm
     )
@@ -69,7 +70,7 @@ def _body(case: Case, name: str, settings: FreeMotion, comm: MPI.Comm) -> RigidB
         points,
         facets,
         inertia,
-        gravity=settings.gravity,
+        gravity=None if settings.gravity is None else [value_of(one) for one in settings.gravity],
         springs=[_point_spring(spring) for spring in settings.springs if spring.to is None],
         loads=[_load(load) for load in settings.loads],
         held={way: _not_at_all for word in settings.held for way in HELD[word]},
@@ -89,17 +90,15 @@ def _point_spring(spring: PointSpringSection) -> PointSpring:
     return PointSpring(spring.at, stiffness, spring.damping, spring.dashpot)
 
 
-def _line_springs(settings: Mapping[str, FreeMotion]) -> Iterator[LineSpring]:
-    """Springs to other points, each once."""
+def _line_springs(case: Case, settings: Mapping[str, FreeMotion]) -> Iterator[LineSpring]:
+    """Springs to points of other rigid bodies and at rest, each once."""
     numbers = {name: index for index, name in enumerate(settings)}
     for name, free in settings.items():
         for spring in free.springs:
-            if (end := spring.to) is None:
+            if (end := spring.to) is None or end.body in case.elastic_bodies:
                 continue
             other = None if end.body is None else numbers[end.body]
-            k = spring.stiffness[0]
-            damping = spring.damping * k + spring.dashpot
-            yield LineSpring(numbers[name], spring.at, other, end.at, k, damping, spring.free_length)
+            yield LineSpring(numbers[name], spring.at, other, end.at, spring.law())
 
 
 def _load(load: RigidLoadSection) -> PointLoad:

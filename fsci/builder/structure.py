@@ -12,6 +12,7 @@ from fsci.builder.closed_parts import closed_parts
 from fsci.builder.columns import Table
 from fsci.builder.loads import build_loads
 from fsci.builder.named import named
+from fsci.builder.point_springs import point_springs
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.checks import VECTORS
@@ -33,6 +34,7 @@ from solvers.structure.materials import (
     PlaneStressLinearElastic,
     PlaneStressStVenantKirchhoff,
 )
+from solvers.structure.point_springs import SpringOutside
 from solvers.structure.relaxation import Branch
 from solvers.structure.supports import SupportError
 from solvers.structure.time_scheme import Statics, TimeScheme
@@ -41,6 +43,7 @@ from solvers.values import combine
 
 if TYPE_CHECKING:
     from solvers.contact.contact import Contact
+    from solvers.rigid.field import RigidBodies
 
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
@@ -50,15 +53,23 @@ def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
 
 
 def build_structure(
-    case: Case, comm: MPI.Comm, bodies: list[Body], contact: Constraint | None, timer: Timer
+    case: Case,
+    comm: MPI.Comm,
+    bodies: list[Body],
+    contact: Constraint | None,
+    timer: Timer,
+    rigid: RigidBodies | None = None,
 ) -> Structure:
-    """The field of all bodies. Raises CaseError (collective)."""
-    linear = case.solver.linear
+    """The field of all bodies; rigid: those that springs may lead to. Raises CaseError (collective)."""
+    linear, placed = case.solver.linear, point_springs(case, rigid)
     settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     try:
         alone = case.coupling is None
         time = _time_scheme(case)
-        return Structure(bodies, time, settings, contact=contact, exchanges_mass=alone, timer=timer)
+        springs = [spring for _, spring in placed]
+        return Structure(bodies, time, settings, contact=contact, exchanges_mass=alone, springs=springs, timer=timer)
+    except SpringOutside as error:
+        raise case.error(placed[error.spring][0][error.end], str(error)) from None
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
         index = next(i for i, support in enumerate(supports) if error.where in (support.on or ()))

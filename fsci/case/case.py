@@ -130,6 +130,11 @@ class Case(Section):
         return found or None
 
     @property
+    def moving(self) -> set[str]:
+        """Names of all bodies that forces move: free and elastic ones."""
+        return {*(self.rigid or {}), *self.elastic_bodies}
+
+    @property
     def joined(self) -> set[frozenset[str]]:
         """Free bodies, by twos, that a spring without length joins."""
         return {

@@ -11,7 +11,7 @@ from fsci.case.coupling_checks import coupling_mistakes
 from fsci.case.errors import did_you_mean
 from fsci.case.fluid import Movement
 from fsci.case.fluid_checks import fluid_mistakes, movement_mistakes
-from fsci.case.free_checks import free_mistakes
+from fsci.case.free_checks import free_mistakes, spring_mistakes
 from fsci.case.material import HolzapfelGasserOgdenSection, OwnLawSection, has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
@@ -92,7 +92,7 @@ def _loose(case: Case) -> Iterator[Mistake]:
                 yield keys, f"'{name}' is also the name of an obstacle; give this rigid body another one"
             yield from mesh_mistakes(surface.mesh, case.dimension, case.folder, (*keys, "mesh"))
             yield from surfaces_mistakes(surface.mesh, surface.on or (), (*keys, "on"))
-        yield from free_mistakes(others[name], case.dimension, others, whole)
+        yield from free_mistakes(others[name], case.dimension, case.moving, whole)
     if case.rigid_section is not None:
         yield from length_mistakes(case.rigid_section.gravity, case.dimension, ("rigid", "gravity"))
 
@@ -108,6 +108,11 @@ def _structure(case: Case, structure: StructureSection) -> Iterator[Mistake]:
         yield from _surfaces(body, keys)
         yield from _vectors(case, body, keys)
         yield from _needs(case, structure, body, keys)
+        for i, spring in enumerate(body.point_springs):
+            place = (*keys, "point_springs", i)
+            yield from spring_mistakes(spring, case.dimension, case.moving, place)
+            if spring.to is None:
+                yield place, "a spring at a point of an elastic body needs 'to', the other point"
 
 
 def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:

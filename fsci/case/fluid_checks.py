@@ -109,7 +109,7 @@ def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[M
         yield keys, "a free body needs the section 'coupling'; 'coupling: {}' for its defaults"
     if fluid.scheme == "steady":
         yield keys, "a free body needs a time-dependent flow: choose the scheme bdf2"
-    yield from free_mistakes(free, dimension, case.rigid or (), keys)
+    yield from free_mistakes(free, dimension, case.moving, keys)
 
 
 def _motion(fluid: FluidSection, body: RigidBodySection, keys: Keys) -> Iterator[Mistake]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import degrees, dist
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import TypeAdapter, ValidationError, model_validator
 
@@ -22,6 +22,9 @@ from fsci.case.values import (
     Vector,
 )
 
+if TYPE_CHECKING:
+    from solvers.spring_law import SpringLaw
+
 #: Ways that can be held, and which of the six they are.
 HELD = {
     "x": ("x",),
@@ -35,9 +38,9 @@ HELD = {
 
 
 class SpringEndSection(Section):
-    """The other end of a spring: a point of another free body, or at rest."""
+    """The other end of a spring: a point of another body, or at rest."""
 
-    body: Name | None = setting(None, "another free body; default: the point is at rest")
+    body: Name | None = setting(None, "another free or elastic body; default: the point is at rest")
     at: NumberVector = setting(..., "the point, at the start", unit="m")
 
 
@@ -65,6 +68,13 @@ class PointSpringSection(Section):
         """The length without force [m] of a spring to another point."""
         assert self.to is not None
         return dist(self.at, self.to.at) if self.length is None else self.length
+
+    def law(self) -> SpringLaw:
+        """That of a spring to another point."""
+        from solvers.spring_law import SpringLaw
+
+        k = self.stiffness[0]
+        return SpringLaw(k, self.damping * k + self.dashpot, self.free_length)
 
     @model_validator(mode="after")
     def _line(self) -> PointSpringSection:

@@ -11,11 +11,11 @@ from fsci.case.yaml_text import Keys
 
 
 def free_mistakes(free: FreeMotion, dimension: int | None, others: Collection[str], keys: Keys) -> Iterator[Mistake]:
-    """All of one body. dimension: None if only its mesh tells; others: names of all free bodies, its own included."""
+    """All of one body. dimension: None if only its mesh tells; others: names of all free and elastic bodies."""
     for name in ("gravity", "initial_velocity", "pivot"):
         yield from length_mistakes(getattr(free, name), dimension, (*keys, name))
     for i, spring in enumerate(free.springs):
-        yield from _spring(spring, dimension, others, (*keys, "springs", i))
+        yield from spring_mistakes(spring, dimension, others, (*keys, "springs", i))
     for i, load in enumerate(free.loads):
         for name in ("force", "at"):
             yield from length_mistakes(getattr(load, name), dimension, (*keys, "loads", i, name))
@@ -34,20 +34,21 @@ def free_mistakes(free: FreeMotion, dimension: int | None, others: Collection[st
         yield from _held_but_moving(free, dimension, keys)
 
 
-def _spring(
+def spring_mistakes(
     spring: PointSpringSection, dimension: int | None, others: Collection[str], keys: Keys
 ) -> Iterator[Mistake]:
+    """Of one spring; others: names of all free and elastic bodies."""
     yield from length_mistakes(spring.at, dimension, (*keys, "at"))
     if len(spring.stiffness) > 1:
         yield from length_mistakes(spring.stiffness, dimension, (*keys, "stiffness"))
     if spring.to is None:
         return
     yield from length_mistakes(spring.to.at, dimension, (*keys, "to", "at"))
-    if spring.to.body == keys[2]:
+    if spring.to.body == keys[2] and keys[0] != "structure":
         yield (*keys, "to", "body"), f"a spring leads to another body, but '{spring.to.body}' is the body itself"
     elif spring.to.body is not None and spring.to.body not in others:
         hint = did_you_mean(spring.to.body, others)
-        yield (*keys, "to", "body"), f"there is no free rigid body '{spring.to.body}'{hint}"
+        yield (*keys, "to", "body"), f"there is no free or elastic body '{spring.to.body}'{hint}"
 
 
 def _turn_mistakes(values: tuple[object, ...] | None, dimension: int | None, keys: Keys) -> Iterator[Mistake]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
+from fsci.case.free_body import PointSpringSection
 from fsci.case.loads import ActiveSection, LineForceSection, PointForceSection, PressureSection, TractionSection
 from fsci.case.material import Material
 from fsci.case.mesh import Mesh
@@ -106,6 +107,9 @@ class BodySection(Section):
     )
     supports: tuple[SupportSection, ...] = setting(tuple, "prescribed displacements")
     springs: tuple[SpringSection, ...] = setting(tuple, "elastic supports")
+    point_springs: tuple[PointSpringSection, ...] = setting(
+        tuple, "springs and dampers from points of the body to other points, with 'to'"
+    )
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")
     tractions: tuple[TractionSection, ...] = setting(tuple, "dead loads on surfaces")

@@ -23,13 +23,13 @@ UNHELD = 1e-6
 def free_motions(case: Case, name: str, mesh: Mesh) -> str | None:
     """The warning about a static body whose supports and springs leave a rigid motion free; None if they leave none.
 
-    A pair of contact may hold a body; which motions depends on the solution.
+    A pair of contact or a spring to another body may hold it; which motions depends on the solution.
     """
     assert case.structure is not None
     pairs = {} if case.contact is None else case.contact.pairs
     if case.structure.dynamics is not None or case.coupling is not None:
         return None
-    if any(name == side.body for pair in pairs.values() for _, side in pair.sides):
+    if any(name == side.body for pair in pairs.values() for _, side in pair.sides) or _sprung(case, name):
         return None
     dim = mesh.points.shape[1]
     centre = mesh.points.mean(axis=0)
@@ -45,6 +45,14 @@ def free_motions(case: Case, name: str, mesh: Mesh) -> str | None:
     # a rotation about another point than the centre, or a translation along no axis
     words = [*alone, *(["a combination of translation and rotation"] if free > len(alone) else [])]
     return f"no support, spring or pair holds {_listed(words)} of the body, which static equilibrium does not determine"
+
+
+def _sprung(case: Case, name: str) -> bool:
+    """Whether a spring leads from a point of the body to another one."""
+    own = case.elastic_bodies[name].point_springs
+    all_bodies = [*case.elastic_bodies.values(), *(case.rigid or {}).values()]
+    springs = [spring for body in all_bodies for spring in getattr(body, "point_springs", getattr(body, "springs", ()))]
+    return bool(own) or any(spring.to is not None and spring.to.body == name for spring in springs)
 
 
 def _rotations(dim: int) -> list[str]:

@@ -65,7 +65,8 @@ def _may_turn(case: Case, name: str) -> bool:
     """Whether neither supports nor springs hold a body that moves."""
     if case.structure is None or case.structure.dynamics is None or name not in case.elastic_bodies:
         return False
-    return not case.elastic_bodies[name].supports and not case.elastic_bodies[name].springs
+    body = case.elastic_bodies[name]
+    return not (body.supports or body.springs or body.point_springs)
 
 
 def _approach(case: Case, first: Candidate, second: Candidate) -> bool:

@@ -172,7 +172,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
     case.meshes[".".join(settings.keys)] = mesh_checksum(mesh)
     if dim is None and (free := (case.rigid or {}).get(name)) is not None:
         whole = base if base[0] == "rigid" else (*base, "free")
-        for place, message in free_mistakes(free, mesh.points.shape[1], case.rigid or (), whole):
+        for place, message in free_mistakes(free, mesh.points.shape[1], case.moving, whole):
             raise case.error(place, message)
     return mesh, mesh.points[nodes], facets
 

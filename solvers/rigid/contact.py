@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from solvers.algebra.rows import RowTransformation
 from solvers.algebra.sparse import Sparse, nothing, sparse_from_entries
-from solvers.api import Array
+from solvers.api import Array, StepFailed
 from solvers.rigid.body import RigidBody
-from solvers.rigid.coulomb import Touch, contact_forces, positive_definite
+from solvers.rigid.coulomb import Touch, braced, contact_forces, positive_definite
 from solvers.rigid.impact import AT_BOUND, Closed
 from solvers.rigid.near import Moment, Near, Obstacle, RigidPair, search, vertices
 from solvers.rigid.turning import turning
@@ -127,15 +127,23 @@ class RigidContact:
     def press(self, tangent: Sparse, right: Array) -> None:
         """Set the contact forces for a Newton iteration; right: minus the balance without contact.
 
-        When the balance with these forces vanishes, gaps and forces fulfil the conditions of contact. Where
-        forces that turn are larger than what the inertia of the bodies holds upright, they do not turn in `tangent`.
+        When the balance with these forces vanishes, gaps and forces fulfil the conditions of contact. Where forces that
+        turn are larger than what the inertia of the bodies and the contacts of the last iterate hold upright, they do
+        not turn in `tangent`.
         """
         self.tangent = tangent
         if len(self.z) == 0:
             return
-        if not positive_definite(tangent):
+        upright = positive_definite(tangent)
+        if not upright and (self._start is None or not braced(tangent, self.touch, self._start)):
+            self.tangent, upright = tangent + -1.0 * self.stiffness, True
+        try:
+            self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
+        except StepFailed:
+            if upright:
+                raise
             self.tangent = tangent + -1.0 * self.stiffness
-        self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
+            self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
         active = self.active
         in_space = np.einsum("mde,md->me", self.near.frame[active], self.z[active])
         self._pressing = self.near.vertex[active], in_space
@@ -179,7 +187,7 @@ class RigidContact:
         near, touch = self.near[self.active], self.touch[self.active]
         assert self._moment is not None
         given = near.in_frame(near.given) / self._moment.dt + self._of_all(near).motion(without) - touch.motion(without)
-        return Closed(near, touch, self._moment, mass, given, force, gyroscopic)
+        return Closed(near, touch, self.z[self.active], self._moment, mass, given, force, gyroscopic)
 
     def _of_all(self, near: Near) -> Touch:
         """Relative motions by all unknowns, those that are held, too."""

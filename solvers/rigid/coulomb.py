@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.algebra.sparse import Sparse, sparse_from_entries
-from solvers.api import Array, FailureKind, StepFailed
+from solvers.api import Array, FailureKind, Indices32, StepFailed
 
 NO_MOTION = "bodies in contact have no room: no motion of them opens all overlaps"
 NO_FORCES = "the friction of rigid bodies has no contact forces"
@@ -114,14 +114,6 @@ class Touch:
         k = self.B.shape[3]
         return np.maximum(self.body, 0)[:, :, None] * k + np.arange(k)
 
-    def square(self, D: Array, unknowns: int) -> Sparse:
-        """F^T D B; D: shape (m, dim, dim)."""
-        blocks = np.einsum("msdk,mde,mtel->msktl", self.pushed, D, self.B, optimize=True)
-        dofs = self.dofs()
-        rows = np.broadcast_to(dofs[:, :, :, None, None], blocks.shape)
-        columns = np.broadcast_to(dofs[:, None, None, :, :], blocks.shape)
-        return sparse_from_entries(rows.ravel(), columns.ravel(), blocks.ravel(), (unknowns, unknowns))
-
     def rows(self, unknowns: int) -> Sparse:
         """B as a matrix, rows (contact, direction)."""
         return self._matrix(self.B, unknowns)
@@ -160,11 +152,17 @@ def project(p: Array, friction: Array) -> tuple[Array, Array]:
 
 def solver(K: Sparse) -> Callable[[Array], Array]:
     """K^-1 of a right side, by a sparse factorisation."""
+    turned = K.T  # compressed rows of K^T are compressed columns of K
+    return _factors(turned.data, turned.indices, turned.indptr)
+
+
+def _factors(data: Array, rows: Indices32, starts: Indices32) -> Callable[[Array], Array]:
+    """Factors of a matrix by its columns."""
     from scipy.sparse import csc_matrix  # the import takes a fifth of a second: only runs with contact need it
     from scipy.sparse.linalg import splu
 
-    turned = K.T  # compressed rows of K^T are compressed columns of K
-    return splu(csc_matrix((turned.data, turned.indices, turned.indptr), shape=K.shape)).solve
+    n = len(starts) - 1
+    return splu(csc_matrix((data, rows, starts), shape=(n, n))).solve
 
 
 def positive_definite(K: Sparse) -> bool:
@@ -181,6 +179,59 @@ def positive_definite(K: Sparse) -> bool:
     return bool((factors.perm_r == factors.perm_c).all() and (factors.U.diagonal() > 0.0).all())
 
 
+class _System:
+    """The equations of proximal steps: K u = f + F^T z with w = w_0 + B u.
+
+    The entries of K and of F^T D B have their places once for all D.
+    """
+
+    def __init__(self, K: Sparse, f: Array, touch: Touch, w0: Array):
+        self.K, self.f, self.w0, self.friction = K, f, w0, touch.friction
+        m, sides, dim, k = touch.B.shape
+        self._dofs = touch.dofs().reshape(m, -1)
+        self._B = touch.B.transpose(0, 2, 1, 3).reshape(m, dim, sides * k)
+        self._F = touch.pushed.transpose(0, 1, 3, 2).reshape(m, sides * k, dim)
+        own = np.repeat(touch.body >= 0, k, axis=1)
+        self._kept = own[:, :, None] & own[:, None, :]
+        n = K.shape[0]
+        places = (self._dofs[:, None, :] * n + self._dofs[:, :, None])[self._kept]  # by columns
+        keys, place = np.unique(
+            np.concatenate([K.indices.astype(np.int64) * n + K.row_numbers(), places]), return_inverse=True
+        )
+        self._rows, self._columns = (keys % n).astype(np.int32), keys // n
+        self._place, self._count = place[len(K.data) :], len(keys)
+        self._own = np.zeros(self._count)
+        self._own[place[: len(K.data)]] = K.data
+
+    def motion(self, u: Array) -> Array:
+        """w, shape (m, dim)."""
+        return self.w0 + (self._B @ u[self._dofs][:, :, None])[:, :, 0]
+
+    def force(self, z: Array) -> Array:
+        """F^T z by unknown; z: shape (m, dim)."""
+        return np.bincount(self._dofs.ravel(), (self._F @ z[:, :, None]).ravel(), len(self.f)).astype(float)
+
+    def solver(self, D: Array) -> Callable[[Array], Array]:
+        """(K + F^T D B)^-1 of a right side; D: shape (m, dim, dim)."""
+        blocks = np.zeros(self._kept.shape)
+        closed = D.any(axis=(1, 2))
+        blocks[closed] = self._F[closed] @ (D[closed] @ self._B[closed])
+        data = self._own + np.bincount(self._place, blocks[self._kept], self._count)
+        some = data != 0.0
+        starts = np.searchsorted(self._columns[some], np.arange(len(self.f) + 1)).astype(np.int32)
+        return _factors(data[some], self._rows[some], starts)
+
+
+def braced(K: Sparse, touch: Touch, z: Array) -> bool:
+    """Whether the symmetric part of K is positive definite in the motions that contacts with these forces leave."""
+    closed = z[:, 0] > 0.0
+    stuck = closed & (np.linalg.norm(z[:, 1:], axis=1) < (1.0 - FORCE_ROUNDING) * touch.friction * z[:, 0])
+    dim = z.shape[1]
+    kept = np.concatenate([closed[:, None], np.repeat(stuck[:, None], dim - 1, axis=1)], axis=1)
+    B = touch.rows(K.shape[0]).scaled_rows(np.where(kept, np.sqrt(_stiffness(K, touch))[:, None], 0.0).ravel())
+    return positive_definite(K + B.T @ B)
+
+
 def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | None = None) -> tuple[Array, Array]:
     """(u, z) of shapes (n,) and (m, dim). start: z of a problem nearby.
 
@@ -195,15 +246,15 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
     if (w0[~(r > 0.0), 0] < 0.0).any():
         raise StepFailed("rigid bodies", FailureKind.NO_ROOM, NO_MOTION)
     z = np.zeros_like(w0) if start is None else start * (r > 0.0)[:, None]
+    system = _System(K, f, touch, w0)
     u, share, change = free, FIRST_SHARE if start is None else 10.0 * FIRST_SHARE, np.full_like(w0, np.inf)
     for _ in range(PROXIMAL_STEPS):
-        solved = _proximal_step(K, f, touch, w0, share * r, z, u)
+        solved = _proximal_step(system, share * r, z, u)
         if solved is None:
             share *= 0.1
             continue
         last, before, u = change, z, solved
-        w = w0 + touch.motion(u)
-        z = project(before - share * r[:, None] * w, touch.friction)[0]
+        z = project(before - share * r[:, None] * system.motion(u), touch.friction)[0]
         change = (z - before) / share
         if _found(z, change, last, share):
             return u, z
@@ -246,19 +297,18 @@ def _stiffness(K: Sparse, touch: Touch) -> Array:
     return np.divide(PROXIMAL, soft, out=np.zeros_like(soft), where=soft > 0.0)
 
 
-def _proximal_step(K: Sparse, f: Array, touch: Touch, w0: Array, r: Array, z: Array, u: Array) -> Array | None:
-    """u with K u = f + B^T P(z - r w(u)); None if Newton's method does not find it."""
-    n = len(f)
+def _proximal_step(system: _System, r: Array, z: Array, u: Array) -> Array | None:
+    """u with K u = f + F^T P(z - r w(u)); None if Newton's method does not find it."""
 
     def state(u: Array) -> tuple[Array, Array, Array]:
-        forces, D = project(z - r[:, None] * (w0 + touch.motion(u)), touch.friction)
-        return f + touch.force(forces, n) - K @ u, forces, D
+        forces, D = project(z - r[:, None] * system.motion(u), system.friction)
+        return system.f + system.force(forces) - system.K @ u, forces, D
 
     for iterations, halvings in ((WHOLE_INCREMENTS, 1), (HALVED_INCREMENTS, INCREMENT_HALVINGS)):
         at = u
         missed, forces, D = state(at)
         for _ in range(iterations):
-            step, size = solver(K + touch.square(r[:, None, None] * D, n))(missed), float(np.linalg.norm(missed))
+            step, size = system.solver(r[:, None, None] * D)(missed), float(np.linalg.norm(missed))
             before, slopes = forces, D
             for halving in range(halvings):
                 new = at + 0.5**halving * step
@@ -266,7 +316,7 @@ def _proximal_step(K: Sparse, f: Array, touch: Touch, w0: Array, r: Array, z: Ar
                 if halvings == 1 or float(np.linalg.norm(missed)) < size:
                     break
             else:
-                scale = float(touch.force(np.abs(forces), n).max(initial=0.0)) + float(np.abs(f).max())
+                scale = float(system.force(np.abs(forces)).max(initial=0.0)) + float(np.abs(system.f).max())
                 if size <= FORCE_ROUNDING * scale:
                     return at
                 break

@@ -78,8 +78,7 @@ class RigidBodies:
         for index, body in enumerate(bodies):
             free[index, body.held_components] = False
         self._free = free[:, self.components].ravel()
-        self.balance = np.zeros(self.unknowns)
-        self._exchanged = 0.0  # [J]
+        self.balance, self._exchanged = np.zeros(self.unknowns), 0.0  # [J]
         self._noise: Array | None = None  #: rounding errors of the balance; None before this step linearises
 
     def behind(self, others: int) -> None:
@@ -283,6 +282,7 @@ class RigidBodies:
 
     def residual(self) -> Array:
         """Norm [N] of the balance of each body; moments are divided by its size."""
+        self.on_surface = surface.resultants(self.bodies, self.now, self._forces)  # whose moments turn with the bodies
         mean = self._by_component(self.mean_load(self.on_surface_old, self.on_surface))
         if self.contact is not None:
             self.contact.forget()

@@ -30,6 +30,7 @@ class Closed:
 
     near: Near
     touch: Touch
+    z: Array  #: forces of the step [N] in the frames, shape (m, dim), near those that are sought
     moment: Moment
     mass: Sparse  #: of all unknowns, with rows and columns of the identity for held ones
     given: Array  #: relative velocities by motions that are prescribed [m/s], in the frames, shape (m, dim)
@@ -45,7 +46,7 @@ class Closed:
         rebound = -restitution * np.minimum(self.relative(before)[:, 0], 0.0)
         offset = self.given.copy()
         offset[:, 0] -= rebound
-        velocity, impulse = contact_forces(self.mass, self.mass @ without, self.touch, offset)
+        velocity, impulse = contact_forces(self.mass, self.mass @ without, self.touch, offset, self.moment.dt * self.z)
         self._require_forces(before, self.moment.dt)
         staying = (rebound == 0.0) & (impulse[:, 0] > 0.0)
         ways = np.where(self._slide(impulse)[:, None], impulse[:, 1:] / np.maximum(impulse[:, :1], 1e-300), 0.0)
@@ -65,7 +66,7 @@ class Closed:
         touch = free.sliding(slope)[staying]
         for tried in (offset, np.zeros_like(offset)):  # bodies that are wedged may have none that fit their rotation
             try:
-                z = contact_forces(self.mass, self.force - self.gyroscopic, touch, tried)[1]
+                z = contact_forces(self.mass, self.force - self.gyroscopic, touch, tried, self.z[staying])[1]
             except StepFailed:
                 continue
             return self.force + touch.force(z, len(self.force))

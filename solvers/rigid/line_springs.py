@@ -1,16 +1,13 @@
-"""Springs with dampers between points of two rigid bodies, or of a body and a point at rest.
+"""Springs with dampers between points of two rigid bodies, of a body and a point at rest, or of another field.
 
-With the vector d from the second point to the first one, its length L and e = d / L, the force on the first point is
-
-    F = -(k (L - L_0) + c e . d') e,    and   F = -k d - c d'   without a length, L_0 = 0,
-
-which holds the points together in all directions. The second point has -F, so momentum is kept.
+Their law is `solvers.spring_law`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +17,7 @@ from solvers.api import Array
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.motion import RigidInstant, spin
 from solvers.rigid.rotation import skew
+from solvers.spring_law import PointMotion, SpringLaw
 
 
 @dataclass(frozen=True)
@@ -28,11 +26,17 @@ class LineSpring:
 
     body: int  #: index of the body of the first point
     at: Sequence[float]  #: the first point at the start [m], shape (dim,)
-    other: int | None  #: index of the body of the second point; None: it is at rest
+    #: index of the body of the second point, or the motion of a point of another field; None: it is at rest
+    other: int | PointMotion | None
     to: Sequence[float]  #: the second point at the start [m], shape (dim,)
-    stiffness: float  #: k [N/m]; in 2D per depth
-    damping: float  #: c [N s/m]; in 2D per depth
-    length: float  #: L_0 without force [m]
+    law: SpringLaw
+
+
+class BodiesNow(Protocol):
+    """Bodies at present; `RigidBodies` is one."""
+
+    bodies: list[RigidBody]
+    now: list[RigidInstant]
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ def with_springs(
     loads = [now.load.copy() for now in instants]
     for spring in springs:
         ends = _ends(spring, bodies, instants)
-        force = _force(spring, *ends)[0]
+        force = _force(spring.law, *ends)[0]
         for end, f in zip(ends, (force, -force), strict=True):
             if end.body is not None:
                 loads[end.body] += np.concatenate([f, np.cross(end.arm, f)])
@@ -79,14 +83,12 @@ def tangent(
     rows, columns, entries = [], [], []
     for spring in springs:
         ends = _ends(spring, bodies, instants)
-        force, by_d, by_rate = _force(spring, *ends)
+        force, by_d, by_rate = _force(spring.law, *ends)
         signed = [(end, end.body, sign) for end, sign in zip(ends, (1.0, -1.0), strict=True) if end.body is not None]
         for end, row, sign in signed:
             by_place = _by_place(end)
             for other, column, other_sign in signed:
-                place = _by_place(other)
-                speed = place @ rates[column]
-                speed[:, 3:] -= skew(other.turning) @ skew(other.arm)
+                place, speed = _by_motion(other, rates[column])
                 block = sign * other_sign * by_place.T @ (by_d @ place + by_rate @ speed)
                 if other is end:
                     block[3:, 3:] += sign * skew(force) @ skew(end.arm)
@@ -100,9 +102,31 @@ def tangent(
     return sparse_from_entries(row, column, entry, (len(free), len(free)))
 
 
+def point_motion(field: BodiesNow, index: int, at: Sequence[float]) -> tuple[Array, Array]:
+    """Position [m] and velocity [m/s] of a point of a body at present, each of shape (3,)."""
+    end = _end(index, at, field.bodies, field.now)
+    return end.x, end.v
+
+
+def by_unknowns(field: BodiesNow, index: int, at: Sequence[float], rate: Array) -> tuple[Array, Array]:
+    """Derivatives of position and velocity of a point by the six unknowns of its body, each of shape (3, 6).
+
+    rate: that of the velocities of the body by the same.
+    """
+    return _by_motion(_end(index, at, field.bodies, field.now), rate)
+
+
 def _by_place(end: _End) -> Array:
     """Derivative of the place of an end by the unknowns of its body, shape (3, 6)."""
     return np.hstack([np.eye(3), -skew(end.arm)])
+
+
+def _by_motion(end: _End, rate: Array) -> tuple[Array, Array]:
+    """The same, and that of its velocity; rate: of the velocities of the body."""
+    place = _by_place(end)
+    speed = place @ rate
+    speed[:, 3:] -= skew(end.turning) @ skew(end.arm)
+    return place, speed
 
 
 def _ends(spring: LineSpring, bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]) -> tuple[_End, _End]:
@@ -113,8 +137,13 @@ def _ends(spring: LineSpring, bodies: Sequence[RigidBody], instants: Sequence[Ri
 
 
 def _end(
-    index: int | None, point: Sequence[float], bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]
+    index: int | PointMotion | None,
+    point: Sequence[float],
+    bodies: Sequence[RigidBody],
+    instants: Sequence[RigidInstant],
 ) -> _End:
+    if callable(index):
+        return _End(None, *index(), np.zeros(3), np.zeros(3))
     at = np.array([point], dtype=float)
     if index is None:
         return _End(None, in_space(at)[0], np.zeros(3), np.zeros(3), np.zeros(3))
@@ -124,14 +153,6 @@ def _end(
     return _End(index, x, now.v[:3] + np.cross(turning, arm), arm, turning)
 
 
-def _force(spring: LineSpring, first: _End, second: _End) -> tuple[Array, Array, Array]:
-    """(force on the first end [N], its derivative by d [N/m], by d' [N s/m]), shapes (3,), (3, 3), (3, 3)."""
-    d, rate, k, c = first.x - second.x, first.v - second.v, spring.stiffness, spring.damping
-    length = float(np.linalg.norm(d))
-    if spring.length == 0.0 or length == 0.0:
-        return -k * d - c * rate, -k * np.eye(3), -c * np.eye(3)
-    e = d / length
-    turned = (np.eye(3) - np.outer(e, e)) / length
-    tension = k * (length - spring.length) + c * e @ rate
-    by_d = -np.outer(e, k * e + c * rate @ turned) - tension * turned
-    return -tension * e, by_d, -c * np.outer(e, e)
+def _force(law: SpringLaw, first: _End, second: _End) -> tuple[Array, Array, Array]:
+    """(force on the first end [N], its derivative by d [N/m], by d' [N s/m]), see `SpringLaw.force`."""
+    return law.force(first.x - second.x, first.v - second.v)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -163,9 +163,10 @@ def search(pairs: Sequence[RigidPair], starts: Sequence[int], moment: Moment, ke
     x = positions(moment.bodies, moment.now)
     low, high = (np.array([getattr(own, end)(axis=0) for own in x]) for end in ("min", "max"))
     found: list[Near] = []
-    obstacles: dict[int, _Side] = {}
+    obstacles = {id(pair.other): pair.other for pair in pairs if isinstance(pair.other, Obstacle)}
+    beside_all = {key: _side(obstacle, moment) for key, obstacle in obstacles.items()}
     sides = [_Side(index, at, moment.bodies[index].facets, None) for index, at in enumerate(x)]
-    for number in _near_pairs(pairs, low, high):
+    for number in _near_pairs(pairs, low, high, beside_all):
         pair, start = pairs[number], starts[number]
         body, other = pair.body, pair.other
         own = sides[body]
@@ -175,17 +176,14 @@ def search(pairs: Sequence[RigidPair], starts: Sequence[int], moment: Moment, ke
             at = Gaps(at.gap[close], at.normal[close], close)
             found.append(_near(start + close, own, close, at, None, pair.friction, moment))
             continue
-        if isinstance(other, int):
-            beside = sides[other]
-        else:
-            beside = obstacles.setdefault(id(other), _side(other, moment))
+        beside = sides[other] if isinstance(other, int) else beside_all[id(other)]
         for first, points, surface in ((start, own, beside), (start + len(own.x), beside, own)):
             found += _vertices_near(first, points, surface, pair.friction, moment, kept)
     return Near.joined(found, x[0].shape[1])
 
 
-def _near_pairs(pairs: Sequence[RigidPair], low: Array, high: Array) -> Iterator[int]:
-    """Numbers of the pairs whose boxes are near each other; of obstacles all."""
+def _near_pairs(pairs: Sequence[RigidPair], low: Array, high: Array, obstacles: Mapping[int, _Side]) -> Iterator[int]:
+    """Numbers of the pairs whose boxes are near each other; obstacles: by their ids."""
     extents = (high - low).max(axis=1)
     both = np.array([(number, p.body, p.other) for number, p in enumerate(pairs) if isinstance(p.other, int)])
     apart = np.zeros(len(pairs), dtype=bool)
@@ -195,6 +193,10 @@ def _near_pairs(pairs: Sequence[RigidPair], low: Array, high: Array) -> Iterator
         apart[number] = ((low[one] > high[other] + margin) | (low[other] > high[one] + margin)).any(axis=1)
     for index in np.flatnonzero(~apart):
         wall, body = pairs[index].other, pairs[index].body
+        if isinstance(wall, Obstacle):
+            (first, last), margin = obstacles[id(wall)].box, NEAR_BODY * extents[body]
+            if (low[body] > last + margin).any() or (high[body] < first - margin).any():
+                continue
         if isinstance(wall, RigidWall):
             nearest = np.where(wall.normal > 0.0, low[body], high[body])
             if not (nearest - wall.at) @ wall.normal < NEAR_BODY * extents[body]:

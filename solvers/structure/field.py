@@ -29,6 +29,7 @@ from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.inertia import ElasticInertia
 from solvers.structure.instant import Instant
+from solvers.structure.point_springs import PointSprings, SpringBetween
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -51,16 +52,17 @@ class Structure:
         *,
         contact: Constraint | None = None,
         exchanges_mass: bool = False,
+        springs: Sequence[SpringBetween] = (),
         timer: Timer | None = None,
     ):
         """exchanges_mass: surfaces lose their mass only while their contact pairs are near, else for good."""
         self.exchanges_mass = exchanges_mass
         self.comm = comm = bodies[0].domain.comm
         self.bodies, self.time, self.settings = list(bodies), time, settings
-        self.timer, self.constraint = timer or Timer(), contact
-        self.dim = bodies[0].dim
+        self.timer, self.constraint, self.dim = timer or Timer(), contact, bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
         self.pieces = BodyPieces(comm, bodies)
+        self.springs = PointSprings(springs, bodies, self.layout)
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact, self.pieces)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
@@ -75,8 +77,7 @@ class Structure:
         )
         self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
         self._unbalanced = self.residual_force  #: the residual at free dofs [N]
-        self.target = np.zeros(self.layout.size)
-        self.increment = np.zeros(self.layout.size)
+        self.target, self.increment = np.zeros(self.layout.size), np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
         self._stopping: Array | None = None  #: force that would stop the motion in this step [N]
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
@@ -92,6 +93,7 @@ class Structure:
         """Whether tangents away from contact are symmetric (collective)."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
         damped = self.damping is not None and (self.inertia.moves_mass() or not self.damping.symmetric)
+        damped |= self.springs.turning_dampers
         return not (damped or any(len(body.pressures) > len(body.active) for body in self.bodies))
 
     def create_solver(self, *, contact: bool = False) -> PETSc.KSP:
@@ -145,6 +147,7 @@ class Structure:
             self.constraint.present = self.constraint.find_present(u, v, t, dt)
             self.forget_mass()
         self._assemble_bodies()
+        self.now.loads += self.springs.force(self)
         if self.constraint is not None:
             self.start_constraint()
         self.time.start(self, t, dt)
@@ -186,8 +189,7 @@ class Structure:
     def take_start(self, u: Array) -> None:
         """Set the displacements [m] at owned dofs for the start; velocity, acceleration and load are kept."""
         self.now.u = self.held.free_part(u) + self.held.displacement(self.current.t)
-        self._assemble_bodies()
-        self._assemble_constraint()
+        self.assemble()
         self.energy.start(*self._energies())
 
     def step(self, t: float, dt: float) -> StepInfo:
@@ -282,6 +284,7 @@ class Structure:
     def assemble(self) -> None:
         """Compute forces at the present displacement."""
         self._assemble_bodies()
+        self.now.loads += self.springs.force(self)
         self._assemble_constraint()
 
     def _assemble_bodies(self) -> None:
@@ -308,6 +311,7 @@ class Structure:
         with self.timer("contact"):
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
+        self.now.loads += self.springs.force(self)
         self.now.rigid = self.time.rigid_force(self, self.current.dt)
         if self.damping is not None:
             self.now.damping = self.damping.force(self.now.v)
@@ -390,7 +394,7 @@ class Structure:
     def linearise(self) -> PETSc.Mat:
         """The tangent at the present iterate without supports, and the rounding error; the next call overwrites it."""
         with self.timer("assembly"):
-            matrix = self.tangent()
+            matrix = self.springs.added_to(self, self.tangent())
         # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
         return matrix
@@ -483,11 +487,7 @@ class Structure:
 
     def norm(self, array: Array) -> float:
         """Euclidean norm of owned dofs over all processes."""
-        return float(np.sqrt(self.dot(array, array)))
-
-    def dot(self, a: Array, b: Array) -> float:
-        """Inner product of owned dofs over all processes."""
-        return self.comm.allreduce(float(a @ b))
+        return float(np.sqrt(self.comm.allreduce(float(array @ array))))
 
     # ---------------------------------------------------------------------------------------- save and restore
 

@@ -253,7 +253,7 @@ MISTAKES = [
         "body: one, at",
         "a spring leads to another body, but 'one' is the body itself",
     ),
-    (ALONE, "body: two, at", "body: tow, at", "there is no free rigid body 'tow'; did you mean 'two'?"),
+    (ALONE, "body: two, at", "body: tow, at", "there is no free or elastic body 'tow'; did you mean 'two'?"),
     (ALONE, "stiffness: 40", "stiffness: [40, 3]", "'stiffness' must be one number for a spring along a line"),
     (
         ALONE,

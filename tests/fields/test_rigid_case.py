@@ -110,7 +110,7 @@ MISTAKES = [
         "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'; outside of"
         " the box it is dry",
     ),
-    ("stiffness: [3, 1]", "stiffness: 3, to: {body: disk, at: [0, 0]}", "there is no free rigid body 'disk'"),
+    ("stiffness: [3, 1]", "stiffness: 3, to: {body: disk, at: [0, 0]}", "there is no free or elastic body 'disk'"),
     ("held: []", "pivot: [0.5, 0.5, 0.5]", "'pivot' must have 2 entries in 2D, not 3"),
     (
         "{body: disc, quantity: c",

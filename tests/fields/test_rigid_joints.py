@@ -17,6 +17,7 @@ from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
 from solvers.rigid.line_springs import LineSpring
+from solvers.spring_law import SpringLaw
 
 TIGHT = Tolerance(1e-12)
 CUBE = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
@@ -198,7 +199,7 @@ def two_masses(steps: int, rho_inf: float = 1.0):
     """Two squares on a spring, stretched: (field, exact stretch at the end, as cos(omega t))."""
     left = rectangle((0.0, 0.0), (1.0, 1.0), 2.0, "left", initial_velocity=(0.3, 0.1))
     right = rectangle((2.0, 0.0), (3.0, 1.0), 5.0, "right", initial_velocity=(0.3, 0.1))
-    spring = LineSpring(0, (1.0, 0.5), 1, (2.0, 0.5), 40.0, 0.0, 0.8)
+    spring = LineSpring(0, (1.0, 0.5), 1, (2.0, 0.5), SpringLaw(40.0, 0.0, 0.8))
     omega = np.sqrt(40.0 * (2.0 + 5.0) / 10.0)
     bodies = field(left, right, springs=[spring], rho_inf=rho_inf)
     end = 1.7 * 2.0 * np.pi / omega
@@ -225,7 +226,7 @@ def test_a_damper_alone_brings_two_bodies_to_one_speed():
     """v1 - v2 = v0 exp(-c (m1 + m2) t / (m1 m2)) with c = 3."""
     left = rectangle((0.0, 0.0), (1.0, 1.0), 2.0, "left", initial_velocity=(1.0, 0.0))
     right = rectangle((5.0, 0.0), (6.0, 1.0), 5.0, "right")
-    bodies = field(left, right, springs=[LineSpring(0, (0.5, 0.5), 1, (5.5, 0.5), 0.0, 3.0, 5.0)])
+    bodies = field(left, right, springs=[LineSpring(0, (0.5, 0.5), 1, (5.5, 0.5), SpringLaw(0.0, 3.0, 5.0))])
     for _ in march(bodies, 1.0, 50):
         pass
     speed = bodies.now[0].v[0] - bodies.now[1].v[0]
@@ -235,7 +236,7 @@ def test_a_damper_alone_brings_two_bodies_to_one_speed():
 def test_a_spring_to_a_point_at_rest_keeps_its_length_in_a_circle():
     """A stiff tether of length 2 with a body that circles: the stretch carries m v^2 / r."""
     body = rectangle((1.5, -0.5), (2.5, 0.5), 1.0, initial_velocity=(0.0, 3.0), initial_spin=(0.0, 0.0, 1.5))
-    bodies = field(body, springs=[LineSpring(0, (2.0, 0.0), None, (0.0, 0.0), 1e4, 100.0, 2.0)], rho_inf=0.5)
+    bodies = field(body, springs=[LineSpring(0, (2.0, 0.0), None, (0.0, 0.0), SpringLaw(1e4, 100.0, 2.0))], rho_inf=0.5)
     for _ in march(bodies, 2.0, 100):
         pass
     r = float(np.linalg.norm(body.inertia.centre + bodies.now[0].shift[:2]))
@@ -247,7 +248,7 @@ def test_a_spring_of_no_length_holds_two_bars_together_as_a_hinge():
     """A double pendulum at rest hangs straight: the joint carries the weight of the lower bar."""
     upper = hinged(rectangle((-0.05, -1.0), (0.05, 0.0), gravity=(0.0, -10.0)), (0.0, 0.0))
     lower = rectangle((-0.05, -2.0), (0.05, -1.0), name="lower", gravity=(0.0, -10.0))
-    joint = LineSpring(0, (0.0, -1.0), 1, (0.0, -1.0), 1e5, 1e3, 0.0)
+    joint = LineSpring(0, (0.0, -1.0), 1, (0.0, -1.0), SpringLaw(1e5, 1e3, 0.0))
     bodies = field(upper, lower, springs=[joint], rho_inf=0.0)
     for _ in march(bodies, 2.0, 40):
         pass
@@ -267,8 +268,8 @@ def test_the_tangent_against_finite_differences(dim, length):
     else:
         one, two = box((0, 0, 0), (1.0, 0.5, 0.7), **own), box((1.5, 0, 0), (0.5, 1.0, 0.7), name="other", **own)
     springs = [
-        LineSpring(0, point(), 1, point(), 7.0, 0.6, length),
-        LineSpring(1, point(), None, point(), 3.0, 0.2, length),
+        LineSpring(0, point(), 1, point(), SpringLaw(7.0, 0.6, length)),
+        LineSpring(1, point(), None, point(), SpringLaw(3.0, 0.2, length)),
     ]
     bodies = field(hinged(one, point()), two, springs=springs, rho_inf=0.6)
     bodies.initialise(0.0, 0.1)
@@ -294,3 +295,21 @@ def test_the_tangent_against_finite_differences(dim, length):
         step = h * np.eye(2 * n)[column]
         found = (balance(step) - balance(-step)) / (2.0 * h)
         assert found[free] == pytest.approx(tangent[free, column], rel=1e-6, abs=1e-6)
+
+
+def test_an_oblique_hinge_is_a_pivot_and_a_joint_on_its_axis():
+    """A door under gravity, as one on an upright axis that is turned with everything else."""
+    points, axis = np.array([0.0, -0.1, 0.0]) + CUBE * [1.0, 0.2, 2.0], (1.0, 0.5, 0.3)
+    weight, swings = np.array([2.0, -6.0, -3.0]), []
+    held = {"rotation_x": lambda t: 0.0, "rotation_y": lambda t: 0.0}
+    for angle in (0.0, 1.1):
+        x, g = turned(points, axis, angle), turned(weight[None], axis, angle)[0]
+        body = RigidBody("door", x, SIDES, inertia_of_surface(x, SIDES, 3.0), gravity=g, held={} if angle else held)
+        top = turned(np.array([[0.0, 0.0, 2.0]]), axis, angle)[0]
+        joint = [LineSpring(0, top, None, top, SpringLaw(1e9, 1e6, 0.0))] if angle else []
+        bodies = field(hinged(body, (0.0, 0.0, 0.0)), springs=joint, rho_inf=0.8)
+        for _ in march(bodies, 1.0, 50):
+            pass
+        swings.append(turned(bodies.displacement(), axis, -angle))
+    assert np.abs(swings[0]).max() > 0.5
+    assert swings[1] == pytest.approx(swings[0], abs=1e-6)
