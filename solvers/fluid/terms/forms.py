@@ -129,17 +129,19 @@ def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Ex
     return _tested(flow, u, p, test) + grad_div
 
 
-def in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr, q: Expr) -> Expr:
-    """Integrand of (tau (R - past), grad q) - (T R, grad q) along the walls of a gap, T that of `residual_based`.
-
-    tau = (rho^2 a . G a + friction^2)^(-1/2).
-    """
+def in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand of -(B + T R, grad q) along the walls of a gap, with B of `flow_in_gaps` and T of `residual_based`."""
     metric, common, viscous = _rates(flow)
     strong, test = dot(gaps.tangents, inertia(flow, u) + grad(p)), dot(gaps.tangents, grad(q))
-    past, tau = dot(gaps.tangents, gaps.past), 1.0 / sqrt(gaps.friction**2 + _convective(flow))
     taus = [1.0 / sqrt(common + viscous * len(metric) * g**2) for g in metric]
-    added = (tau * (strong[i] - past[i]) - elsewhere * strong[i] for i, elsewhere in enumerate(taus))
-    return gaps.share * sum(test[i] * value for i, value in enumerate(added))
+    B = flow_in_gaps(flow, gaps, u, p)
+    return -gaps.share * sum(test[i] * (B[i] + elsewhere * strong[i]) for i, elsewhere in enumerate(taus))
+
+
+def flow_in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr) -> Expr:
+    """B = -tau (R - past) along the walls of a gap [m/s], tau = (rho^2 a . G a + friction^2)^(-1/2)."""
+    tau = 1.0 / sqrt(gaps.friction**2 + _convective(flow))
+    return -tau * dot(gaps.tangents, inertia(flow, u) + grad(p) - gaps.past)
 
 
 def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:

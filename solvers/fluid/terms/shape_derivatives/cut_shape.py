@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers import kernels
-from solvers.api import Array
+from solvers import fem, kernels
+from solvers.api import Array, Indices32
 from solvers.fluid.cut.cut import Cut
 from solvers.fluid.cut.weights import Weights
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
@@ -35,16 +35,14 @@ EXTENT_THAT_HOLDS = 10.0
 
 @dataclass(frozen=True)
 class FlowTerms:
-    """The iterate, and the coefficients of the forms; arrays at local dofs."""
+    """The iterate, and the terms of the flow."""
 
-    flow: Array  #: velocity [m/s] and pressure [Pa]
-    rate: Array  #: alpha times the history and f / rho [m/s^2]
-    scale: Array  #: velocity [m/s] that scales the stabilisation, zero without convection
+    flow: Array  #: velocity [m/s] and pressure [Pa], at local dofs
     density: float  #: [kg/m^3]
     alpha: float  #: [1/s]
-    scale_alpha: float  #: of the scales of the stabilisation [1/s]
     convection: bool
     penalties: Penalties
+    integrands: tuple[fem.Pointwise, ...]  #: of `CellForms`
     gaps: GapTerms
     moved: float  #: largest motion of a vertex in the last iterate [m], infinite in the first one
     velocity: Array  #: of the surface at the corners of pieces [m/s], (pieces, vertices, dim)
@@ -71,7 +69,8 @@ def cut_derivatives(
     local, moments = cut.cut[cut.pieces.cell[mine]], cut.pieces.moments[mine][:, rule.order]
     pieces, identity = len(mine), np.eye(dim)
     _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
-    density = _density(local[first], at.u[first], at.p[first], at.sizes[first], mu, rule, state)
+    density = _density(local[first], state)
+    density = density.reshape(*density.shape[:2], at.p.shape[1], dim + 1)
 
     slope = normal_derivative(at.x, n)
     both, slopes = _means(at, state.flow)
@@ -174,35 +173,9 @@ def _penalty_by_motion(at: InterfaceTerms, slope: Array, w: Array, changes: Pena
     return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * changes.normal[:, None] * w_n
 
 
-def _density(cells: NDArray, u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: FlowTerms) -> Array:
-    """`forms.bulk` + `forms.residual_based` + `forms.in_gaps` at points for each test function, (cells, q, a, i).
-
-    cells: local; u, p: their dofs, (cells, a, k) and (cells, a); sizes: lengths of their edges [m].
-    """
-    (phi, slopes), rho, dim = rule.velocity_table, state.density, sizes.shape[1]
-    gradient = slopes / sizes[:, None, None]
-    velocity, rate, a = (phi @ values[u] for values in (state.flow, state.rate, state.scale))
-    du = np.swapaxes(state.flow[u], 1, 2)[:, None] @ gradient
-    pressure, dp = state.flow[p] @ phi.T, (state.flow[p][:, None, None] @ gradient)[:, :, 0]
-    inertia = rho * (state.alpha * velocity - rate)
-    if state.convection:
-        inertia += rho * (du @ velocity[..., None])[..., 0]
-    metric = 4.0 / sizes[:, None] ** 2
-    convective = rho**2 * (metric * a**2).sum(axis=2, keepdims=True)
-    common = convective + 4.0 * rho**2 * state.scale_alpha**2
-    taus = 1.0 / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
-    strong = taus * (inertia + dp)
-    divergence = np.einsum("Cqkk->Cq", du)
-    viscous = 36.0 * mu**2 * (metric**2).sum(axis=2)
-    against = np.sqrt(convective[..., 0] + viscous) / metric.sum(axis=2) * divergence - pressure
-    value = np.concatenate([inertia, divergence[..., None]], axis=2)
-    by_slope = np.empty((*velocity.shape, dim + 1))
-    by_slope[..., :dim] = mu * (du + np.swapaxes(du, 2, 3)) + against[..., None, None] * np.eye(dim)
-    by_slope[..., :dim] += rho * a[..., None] * strong[:, :, None]
-    by_slope[..., dim] = strong
-    if state.gaps.marked is not None:
-        share, tangents = state.gaps.share_and_tangents(cells)
-        against = (inertia + dp) @ tangents
-        through = taus * against + state.gaps.flow(cells, inertia + dp, a)
-        by_slope[..., dim] -= (share[:, None, None] * through) @ tangents
-    return phi[:, :, None] * value[:, :, None] + gradient @ by_slope
+def _density(cells: Indices32, state: FlowTerms) -> Array:
+    """Integrand over the fluid at points of local cells for each test function, (cells, q, a, i)."""
+    found, gaps = state.integrands[0].on(cells), state.gaps.marked
+    if gaps is not None:
+        found[gaps[cells]] += state.integrands[1].on(cells[gaps[cells]])
+    return found
