@@ -158,4 +158,10 @@ def test_a_term_of_the_forms_alone(dim, monkeypatch):
     for (found, exact), (found_without, exact_without) in zip(*added, strict=True):
         term = exact - exact_without
         np.testing.assert_allclose(found - found_without, term, atol=1e-6 * max(np.abs(term).max(), 1e-3))
-    assert min(np.abs(found - without).max() for (found, _), (without, _) in zip(added[0][:2], added[1][:2])) > 0.1
+    assert (
+        min(
+            np.abs(found - without).max()
+            for (found, _), (without, _) in zip(*(pairs[:2] for pairs in added), strict=True)
+        )
+        > 0.1
+    )
