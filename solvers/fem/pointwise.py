@@ -77,8 +77,9 @@ def _flat(values: Array) -> Array:
 
 def _tabulate(tabulate: Any, values: Array, *data: Array) -> None:
     """Call a compiled function in each cell; data: of coefficients, constants and coordinates."""
-    out, w, c, x = (_FFI.cast("double *", part.ctypes.data) for part in (values, *data))
+    parameters = _FFI.typeof(tabulate).args
+    out, w, c, x = (_FFI.cast(parameters[0], part.ctypes.data) for part in (values, *data))
     size, stride, nodes = (prod(part.shape[1:]) for part in (values, data[0], data[2]))
-    nothing = [_FFI.NULL] * (len(_FFI.typeof(tabulate).args) - 4)  # facets, permutations, later more
+    nothing = [_FFI.NULL] * (len(parameters) - 4)  # facets, permutations, later more
     for k in range(len(values)):
         tabulate(out + k * size, w + k * stride, c, x + k * nodes, *nothing)
