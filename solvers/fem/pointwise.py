@@ -9,6 +9,7 @@ from math import prod
 from typing import Any
 
 import numpy as np
+import ufl
 from cffi import FFI
 from ufl.algorithms.analysis import extract_arguments, extract_coefficients, extract_constants
 
@@ -18,7 +19,7 @@ from solvers.fem.calls import calls
 from solvers.fem.compiling import compiling
 from solvers.fem.domain import Domain
 from solvers.fem.forms import AXIS_ALIGNED_OPTIONS, COMPILE_OPTIONS
-from solvers.fem.spaces import cell_blocks
+from solvers.fem.spaces import cell_blocks, cell_of
 
 _FFI = FFI()
 
@@ -40,7 +41,7 @@ class Pointwise:
         expression, of_aligned = self._expression, self._domain.axis_aligned
         with compiling(self._what), axis_aligned() if of_aligned else nullcontext():
             options = AXIS_ALIGNED_OPTIONS if of_aligned else COMPILE_OPTIONS
-            found = calls.compile_expression(expression, self._points, options).ufcx_expression
+            found = calls.tabulator(self._domain.comm, expression, self._points, options)
         known, used = extract_coefficients(expression), range(found.num_coefficients)
         tests = [argument.ufl_function_space() for argument in extract_arguments(expression)]
         return (
@@ -50,11 +51,15 @@ class Pointwise:
             [cell_blocks(space).shape[1] * space.dofmap.index_map_bs for space in tests],
         )
 
+    def compile(self) -> None:
+        """Compile it if it is not yet (collective)."""
+        _ = self._compiled
+
     def on(self, cells: Indices32, given: Mapping[Any, Array] | None = None) -> Array:
         """Values (cells, points, ...) in local cells, which may recur (collective if it is used first).
 
-        given: instead of the values of some functions, those at the dofs of each of the cells, (cells, ...). The last
-        axis has the dofs of a cell of the test function, if there is one.
+        given: of `numbers_of_cells`, (cells, ...), or, instead of the values of a function, those at its dofs. The last
+        axis of what is returned has the dofs of a cell of the test function, if there is one.
         """
         mesh, given, (tabulate, used, constants, sizes) = self._domain.mesh, given or {}, self._compiled
         w = [_flat(given[f] if f in given else _of_cells(f, cells)) for f in used]
@@ -64,6 +69,19 @@ class Pointwise:
         values = np.zeros((len(cells), len(self._points), *self._expression.ufl_shape, *sizes))
         _tabulate(tabulate, values, data, numbers, np.ascontiguousarray(mesh.geometry.x[corners]))
         return values
+
+
+def numbers_of_cells(domain: Domain, count: int) -> Any:
+    """A vector of numbers for an expression, which have no values but those that `Pointwise.on` is given."""
+    element = calls.mixed_element([calls.discontinuous_element(cell_of(domain), 0)] * count)
+    return _Numbers(ufl.FunctionSpace(domain.mesh.ufl_domain(), element))
+
+
+class _Numbers(ufl.Coefficient):
+    """Form compilers take its text, which otherwise is w_{10} after nine others, for a name in C."""
+
+    def __str__(self) -> str:
+        return "numbers"
 
 
 def _of_cells(function: Any, cells: Indices32) -> Array:

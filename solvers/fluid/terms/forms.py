@@ -1,6 +1,6 @@
 """Weak forms of the flow on a cut grid: bulk, stabilisation, ghost penalty. The terms at surfaces are in `nitsche`.
 
-sigma(u, p) = 2 mu eps(u) - p I is the stress and h an edge length of the cell. The time derivative is
+h is an edge length of the cell. The time derivative is
 alpha u - history, with alpha = 0 in steady flow. `a` is the velocity that scales the stabilisation: that of an earlier
 step or iterate.
 Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300; Schott, Wall, ibid. 276 (2014)
@@ -85,10 +85,6 @@ def nothing(dim: int) -> Expr:
 
 def eps(u: Expr) -> Expr:
     return sym(grad(u))
-
-
-def sigma(flow: Coefficients, u: Expr, p: Expr) -> Expr:
-    return viscous_stress(flow, u) - p * ufl.Identity(len(u))
 
 
 def viscous_stress(flow: Coefficients, u: Expr) -> Expr:
