@@ -250,6 +250,16 @@ def test_values_at_points_for_test_functions(square, degree):
     assert pointwise.on(cells[:0]).shape == (0, *values.shape[1:])
 
 
+def test_numbers_of_cells_that_recur(square):
+    """Form compilers of DOLFINx 0.5 cannot name the tenth coefficient by its text."""
+    numbers = [fem.numbers_of_cells(square, 5) for _ in range(11)][-1]
+    moment = fem.Pointwise(square, numbers[2] * ufl.SpatialCoordinate(square.mesh)[0], np.array([[0.5, 0.5]]), "a test")
+    given = {numbers: np.arange(15.0).reshape(3, 5)}
+    middle = fem.cell_midpoints(square)[0]
+    found = moment.on(np.array([0, 1, 1], dtype=np.int32), given)
+    np.testing.assert_allclose(found[:, 0], [2.0 * middle[0], 7.0 * middle[1], 12.0 * middle[1]])
+
+
 @pytest.mark.parametrize("degree", [1, 2])
 def test_flow_spaces(square, degree):
     """Velocity and pressure dofs are all different, together all there are, and lie at the nodes of the lattice."""
