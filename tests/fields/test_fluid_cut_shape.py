@@ -125,7 +125,7 @@ def test_a_body_through_a_wall_of_the_box(dim):
     [
         (2, 0.05, 0.0, 0.05, 0.09),  # the derivatives that assume u = g: 0.92
         (3, 0.5, 0.0, 0.05, 0.11),  # 0.73
-        (2, 0.0, 1e-5, 0.05, 0.08),  # 0.81; without the terms of `compliant_shape` 0.14
+        (2, 0.0, 1e-5, 0.05, 0.08),  # 0.81; without what slip and layers change 0.14
         (2, 0.05, 1e-5, 0.05, 0.18),  # 0.94; 0.63
         (3, 0.05, 1e-5, 2.0, 0.08),  # without the slip's part of the gradient 0.094
     ],

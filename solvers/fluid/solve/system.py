@@ -9,7 +9,6 @@ updated by the first call that needs it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -46,7 +45,7 @@ from solvers.fluid.terms.interface import InterfaceTerms
 from solvers.fluid.terms.poorly_cut.ghost import Scales
 from solvers.fluid.terms.poorly_cut.ghost_choice import choose_cut_penalty
 from solvers.fluid.terms.shape_derivatives.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
-from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives, FilmIntegrands, film_derivatives
+from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives, film_derivatives
 from solvers.fluid.terms.slip_history import slip_of_facets
 from solvers.mesh.distributed import Nodal
 
@@ -240,19 +239,15 @@ class FlowSystem:
         flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
         g = at.at_corners(cut.motion.v, self.sweep_velocity)
         if degree > 1:
-            return film_derivatives(at, self.weights, self.grid, cut, self.film_integrands, g)
+            assert self.forms.films is not None
+            return film_derivatives(at, self.unknowns, self.weights, cut, self.forms.films, g)
         assert self.gaps is not None
+        assert self.forms.moving is not None
         # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
         moved = self._moved if improved and self.may_close is None else np.inf
-        terms = self.forms.integrands, self.gaps
-        state = FlowTerms(flow, density, alpha, settings.convection, settings.penalties, *terms, moved, g)
+        terms = settings.convection, settings.penalties, self.forms.moving, self.gaps
+        state = FlowTerms(flow, density, alpha, *terms, moved, g)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
-
-    @cached_property
-    def film_integrands(self) -> FilmIntegrands:
-        """The terms of films, for second degree."""
-        points, (bulk,) = self.weights.reference, self.forms.integrands
-        return FilmIntegrands(self.unknowns, self.on_cut, self.flow, bulk, points)
 
     def assemble_zone(self) -> ClosedZone | None:
         """Fluid pressure in closed contact; None if no contact is closed (collective)."""

@@ -13,6 +13,7 @@ from solvers.fluid.cut.weights import Weights
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.terms import forms, nitsche
+from solvers.fluid.terms.shape_derivatives.surface_integrands import FilmIntegrands, MeanIntegrands
 
 
 @dataclass(frozen=True)
@@ -21,9 +22,11 @@ class CellForms:
 
     residuals: tuple[fem.Integral, ...]
     tangents: tuple[fem.Integral, ...]
-    #: by test function, at the points of cut cells: all cells and what is added in gaps, or, for second degree, films
-    integrands: tuple[fem.Pointwise, ...] = ()
     flow_in_gaps: fem.Pointwise | None = None  #: `forms.flow_in_gaps` in the middle of cells
+    #: for the derivatives by the motion of surfaces, at the points of cut cells: integrands over the fluid by test
+    #: function, for first degree what is added in gaps, and the terms of surfaces
+    moving: tuple[fem.Pointwise, fem.Pointwise, MeanIntegrands] | None = None
+    films: tuple[fem.Pointwise, FilmIntegrands] | None = None
 
     def integrals(self) -> list[fem.Integral]:
         """Forms to compile at the start; those of films are compiled when a film appears."""
@@ -89,12 +92,12 @@ def cell_forms(
     if weights is None:
         return found
     parts, what = (*unknowns.parts(function), *unknowns.parts(test)), "the flow's derivative by the motion of surfaces"
-    moved = _on_cut(*both, parts, gaps)[0 if gaps is not None else 1 :]
-    found = replace(found, integrands=tuple(fem.Pointwise(domain, some, weights.reference, what) for some in moved))
+    points, middle = weights.reference, np.full((1, domain.dim), 0.5)
+    in_cut, special = (fem.Pointwise(domain, some, points, what) for some in _on_cut(*both, parts, gaps))
     if gaps is None:
-        return found
-    middle, in_gaps = np.full((1, domain.dim), 0.5), forms.flow_in_gaps(flow, gaps, *parts[:2])
-    return replace(found, flow_in_gaps=fem.Pointwise(domain, in_gaps, middle, "the flow in gaps"))
+        return replace(found, films=(special, FilmIntegrands(domain, both[1], parts, points)))
+    in_gaps = fem.Pointwise(domain, forms.flow_in_gaps(flow, gaps, *parts[:2]), middle, "the flow in gaps")
+    return replace(found, flow_in_gaps=in_gaps, moving=(in_cut, special, MeanIntegrands(domain, both[1])))
 
 
 def _residuals(

@@ -62,12 +62,6 @@ def at_compliant_surface(
     return at_surface(flow, n, P, w, u, p, v, q) - dot(dot(D, traction(flow, n, P, w, u)), traction(flow, n, P, v, v))
 
 
-def load(flow: Coefficients, n: Expr, P: Expr, D: Expr, w: Expr, u: Expr, p: Expr) -> Expr:
-    """R t - p n with R = I - P D: less the force on the surface per area [Pa]."""
-    t = traction(flow, n, P, w, u)
-    return t - dot(P, dot(D, t)) - p * n
-
-
 def penalties(
     flow: tuple[float | Array, float, float],
     factors: Penalties,
