@@ -77,22 +77,24 @@ def cut_derivatives(
     share = area / np.maximum(area.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     means[:, :dim] -= np.einsum("pc,pck->pk", share, state.velocity)
     inertia = np.zeros(len(n)) if at.slip_inertia is None else np.einsum("pc,pc->p", share, at.slip_inertia)
-    found = state.moving[2].on(at, origin, inertia, means, slopes)
-    f, along, by_shape = found[:, :1], found[:, 1 : 1 + dim], found[:, 1 + dim :]
+    found, of_slopes = state.moving[2].on(at, origin, inertia, means, slopes)
+    f, along, by_shape = found[:, 0], found[:, 1 : 1 + dim], found[:, 1 + dim :]
+    of_force, operator = (
+        np.swapaxes(along[..., :dim], 1, 2),
+        MotionOperator(np.empty((len(n), 1 + dim, dim, dim)), along[..., dim]),
+    )
+    operator.fields[:, 0], operator.fields[:, 1:] = of_force, of_slopes
     g = cut.motion.v[at.corners].mean(axis=1) * state.convection
     stretch, changes = _changes(at, g, inertia, state)
     changed = np.swapaxes(changes.reshape(len(n), changes.shape[1], dim**2), 1, 2) @ by_shape
-    by_motion = stretch[..., None] * f[:, None] + changed.reshape(*stretch.shape, f.shape[2])
-    force, leak, of_force = f[:, 0, :dim], f[:, 0, -1 - dim], np.swapaxes(along[..., :dim], 1, 2)
-    of_slopes = along[..., dim : dim + dim**2].reshape(len(n), dim, dim, dim).transpose(0, 3, 2, 1)
-    operator = MotionOperator(np.concatenate([of_force[:, None], of_slopes], axis=1), along[..., -1 - dim])
+    by_motion = stretch[..., None] * f[:, None, None] + changed.reshape(*stretch.shape, f.shape[1])
 
     rows = np.empty((len(n), at.p.shape[1], dim, dim, dim + 1))
-    of_values = np.ascontiguousarray(-by_motion[..., [*range(dim), -1 - dim]])
     density = density.reshape(*density.shape[:2], rows.shape[1], dim + 1)
+    force, leak, of_values = f[:, :dim], f[:, dim], np.ascontiguousarray(-by_motion[..., : dim + 1])
     kernels.surface_rows(moments, density, of_cell, n, at.fields, of_values, -leak, rows)
     if at.mobility is not None:
-        rows[..., dim] += np.einsum("pak,pcjk->pacj", at.pressure_slope, by_motion[..., -dim:])
+        rows[..., dim] += np.einsum("pak,pcjk->pacj", at.pressure_slope, by_motion[..., dim + 1 :])
 
     loads = at.mass_of_pieces[..., None, None] * of_force[:, None, None]
     loads += area[:, :, None, None, None] * np.swapaxes(by_motion[..., :dim], 2, 3)[:, None]

@@ -38,7 +38,8 @@ class FilmIntegrands:
         terms = flow, n, parameters, u - g, u, p
         on_rows, on_force = _surface(*terms, v, q), ufl.diff(_surface(*terms, force, zero[0]), force)
         self._rows, self._force = (
-            fem.Pointwise(domain, _moved(f, n, frozen=(g, slope)), points, what) for f in (on_rows, on_force)
+            fem.Pointwise(domain, ufl.as_vector(_moved(f, n, frozen=(g, slope))), points, what)
+            for f in (on_rows, on_force)
         )
 
     def compile(self) -> None:
@@ -69,28 +70,34 @@ class MeanIntegrands:
         """flow: coefficients in cut cells."""
         self._dim = dim = domain.dim
         vector, tensor = (dim,), (dim, dim)
-        self._of_pieces, (n, parameters, x, w, p, du, dp, tests) = _symbols(
-            domain, vector, (PARAMETERS,), vector, vector, (1,), tensor, vector, (dim + dim**2 + 1 + dim,)
+        self._of_pieces, (n, parameters, x, w, p, du, dp, tests, dv) = _symbols(
+            domain, vector, (PARAMETERS,), vector, vector, (1,), tensor, vector, (2 * dim + 1,), tensor
         )
-        n, parameters, tests = (ufl.variable(part) for part in (n, parameters, tests))
+        n, parameters, tests, dv = (ufl.variable(part) for part in (n, parameters, tests, dv))
         away = ufl.SpatialCoordinate(domain.mesh) - x
-        v = ufl.as_vector([tests[i] + sum(tests[dim + dim * i + k] * away[k] for k in range(dim)) for i in range(dim)])
-        q = tests[dim + dim**2] + sum(tests[dim + dim**2 + 1 + k] * away[k] for k in range(dim))
-        w = w + ufl.dot(du, away)
-        f = ufl.diff(_surface(flow, n, parameters, w, w, p[0] + ufl.dot(dp, away), v, q), tests)
+        v, dq = (ufl.as_vector([tests[first + i] for i in range(dim)]) for first in (0, dim + 1))
+        w, q = w + ufl.dot(du, away), tests[dim] + ufl.dot(dq, away)
+        f = _surface(flow, n, parameters, w, w, p[0] + ufl.dot(dp, away), v + ufl.dot(dv, away), q)
+        moved, of_dv, each = _moved(ufl.diff(f, tests), n, parameters=parameters), ufl.diff(f, dv), range(dim)
+        slopes = [ufl.grad(of_dv[i, k])[j] for k in each for i in each for j in each]
         what = "the flow's derivative by the motion of surfaces"
-        self._pointwise = fem.Pointwise(domain, _moved(f, n, parameters=parameters), np.zeros((1, dim)), what)
+        self._pointwise = fem.Pointwise(domain, ufl.as_vector([*moved, *slopes]), np.zeros((1, dim)), what)
 
-    def on(self, at: InterfaceTerms, origin: Array, inertia: Array, means: Array, slopes: Array) -> Array:
-        """(pieces, 2 dim + PARAMETERS, test functions e_i, x_k e_i, of momentum, 1 and x_k of continuity).
+    def on(self, at: InterfaceTerms, origin: Array, inertia: Array, means: Array, slopes: Array) -> tuple[Array, Array]:
+        """(by test functions e_i of momentum, 1 and x_k of continuity, (pieces, 2 dim + PARAMETERS, 2 dim + 1); slopes
 
+        for x_k e_i of momentum, (pieces, k, i, dim)).
         origin: of the cells of pieces [m], (pieces, dim); inertia: traction of slip in earlier steps [Pa]; means: of
         u - g and p, (pieces, dim + 1); slopes: of u and p, (pieces, dim + 1, dim).
         """
-        dim, tests = self._dim, np.zeros((len(origin), 2 * self._dim + self._dim**2 + 1))
-        numbers = [*_numbers(at, slice(None), inertia), origin, means, slopes, tests]
-        found = self._pointwise.on(at.cell, {self._of_pieces: _beside(numbers)})
-        return found.reshape(len(origin), 2 * dim + PARAMETERS, tests.shape[1])
+        pieces, dim = origin.shape
+        parts, tests = 2 * dim + PARAMETERS, 2 * dim + 1
+        numbers = [*_numbers(at, slice(None), inertia), origin, means, slopes, np.zeros((pieces, tests + dim**2))]
+        found = self._pointwise.on(at.cell, {self._of_pieces: _beside(numbers)})[:, 0]
+        return (
+            found[:, : parts * tests].reshape(pieces, parts, tests),
+            found[:, parts * tests :].reshape(pieces, dim, dim, dim),
+        )
 
 
 def _surface(flow: forms.Coefficients, n: Any, parameters: Any, w: Any, u: Any, p: Any, v: Any, q: Any) -> Any:
@@ -102,7 +109,7 @@ def _surface(flow: forms.Coefficients, n: Any, parameters: Any, w: Any, u: Any, 
     return terms + layer(mobility, n, p, q)
 
 
-def _moved(f: Any, n: Any, frozen: tuple[Any, Any] | None = None, parameters: Any = None) -> Any:
+def _moved(f: Any, n: Any, frozen: tuple[Any, Any] | None = None, parameters: Any = None) -> list[Any]:
     """f, its slope, df/dn and that by `parameters`, one after the other; frozen: a variable and its slope in f."""
     dim, found = len(n), []
     for part in [f[i] for i in range(len(f))] if f.ufl_shape else [f]:
@@ -112,7 +119,7 @@ def _moved(f: Any, n: Any, frozen: tuple[Any, Any] | None = None, parameters: An
         found.append([part, *along, *(ufl.diff(part, n)[k] for k in range(dim))])
         if parameters is not None:
             found[-1] += [ufl.diff(part, parameters)[k] for k in range(PARAMETERS - 1)]
-    return ufl.as_vector([value for values in zip(*found, strict=True) for value in values])
+    return [value for values in zip(*found, strict=True) for value in values]
 
 
 def _symbols(domain: fem.Domain, *shapes: tuple[int, ...]) -> tuple[Any, list[Any]]:
