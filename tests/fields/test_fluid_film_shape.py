@@ -17,7 +17,7 @@ CENTRE = 0.52
 LIMITS = np.array([1e-5, 0.12, 1e-6])
 
 
-def disc_at_wall(kappa):
+def disc_at_wall(kappa, slip=0.0):
     """A disc that approaches a wall, 0.3 cells of 0.1 in front of it, and the displacement of its vertices."""
     points, facets = circle([CENTRE, 0.28], 0.25, 100), loop(100)
     moved = np.zeros_like(points)
@@ -28,6 +28,8 @@ def disc_at_wall(kappa):
     )
     if kappa:
         fluid.system.transmissivity = np.full(len(facets), kappa)
+    if slip:
+        fluid.system.slip_length = np.full(len(facets), slip)
     solve_steady(fluid)
     return fluid, moved
 
@@ -75,6 +77,18 @@ def test_derivatives_of_a_film(kappa, direction):
     fluid, moved = disc_at_wall(kappa)
     momentum, _, force = errors(fluid, moved, None, direction)
     assert min(momentum, force) > 0.005
+
+
+@pytest.mark.parametrize("kappa", [0.0, 1e-5])
+@pytest.mark.parametrize("slip", [1e-3, 1.0])
+def test_derivatives_of_a_film_with_slip(kappa, slip):
+    """Without them most of the derivative would be missing; the penalty, which moves too, is held."""
+    fluid, moved = disc_at_wall(kappa, slip)
+    found = errors(fluid, moved, fluid.system.shape_derivatives(improved=True), (0.0, 1.0))
+    assert (found < LIMITS * [2.0, 1.0, 1.0]).all()
+    fluid, moved = disc_at_wall(kappa, slip)
+    momentum, _, force = errors(fluid, moved, None, (0.0, 1.0))
+    assert min(momentum, force) > 0.04
 
 
 @pytest.mark.parametrize("kappa", [0.0, 1e-5])

@@ -229,12 +229,12 @@ class FlowSystem:
     def shape_derivatives(self, *, improved: bool) -> FilmDerivatives | CutDerivatives | None:
         """Derivatives by the motion of surfaces: of first-degree flows in time, or in films (collective).
 
-        None in steady first-degree flows, where the first increments would be too large, with slip in films, and
-        without films. improved: the step has an increment; before, there are no derivatives in films.
+        None in steady first-degree flows, where the first increments would be too large, and without films. improved:
+        the step has an increment; before, there are no derivatives in films.
         """
         at, cut, settings, degree = self.assemble_interface(), self.cut, self.settings, self.settings.degree
         assert cut is not None
-        if (at.slips or not improved) if degree > 1 else settings.steady:
+        if not improved if degree > 1 else settings.steady:
             return None
         flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
         g = at.at_corners(cut.motion.v, self.sweep_velocity)
