@@ -6,6 +6,7 @@ Of an integrand f: f, its slope with the velocity g of the surface held, and df/
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,37 +30,39 @@ class FilmIntegrands:
 
     def __init__(self, domain: fem.Domain, flow: forms.Coefficients, parts: Sequence[Any], points: Array):
         """flow: coefficients in cut cells; parts: u, p, v and q; points: of cut cells."""
-        dim, (u, p, v, q), what = domain.dim, parts, "the derivative of films by the motion of surfaces"
-        self._of_pieces, (n, parameters, origin, g, slope, force, zero) = _symbols(
+        self._domain, self._flow, self._parts, self._points = domain, flow, parts, points
+
+    @cached_property
+    def _built(self) -> tuple[Any, fem.Pointwise, fem.Pointwise]:
+        """(numbers of pieces, rows, force)."""
+        domain, flow, (u, p, v, q), dim = self._domain, self._flow, self._parts, self._domain.dim
+        numbers, (n, parameters, origin, g, slope, force, zero) = _symbols(
             domain, (dim,), (PARAMETERS,), (dim,), (dim,), (dim, dim), (dim,), (1,)
         )
         n, force = ufl.variable(n), ufl.variable(force)
         g = ufl.variable(g + ufl.dot(slope, ufl.SpatialCoordinate(domain.mesh) - origin))
         terms = flow, n, parameters, u - g, u, p
         on_rows, on_force = _surface(*terms, v, q), ufl.diff(_surface(*terms, force, zero[0]), force)
-        self._rows, self._force = (
-            fem.Pointwise(domain, ufl.as_vector(_moved(f, n, frozen=(g, slope))), points, what)
-            for f in (on_rows, on_force)
-        )
+        moved, what = (_moved(f, n, frozen=(g, slope)) for f in (on_rows, on_force)), "the derivative of films"
+        rows, force = (fem.Pointwise(domain, ufl.as_vector(part), self._points, what) for part in moved)
+        return numbers, rows, force
 
     def compile(self) -> None:
         """Compile what is not yet (collective)."""
-        self._rows.compile()
-        self._force.compile()
+        for part in self._built[1:]:
+            part.compile()
 
     def on(self, at: InterfaceTerms, some: NDArray[np.int64], origin: Array, g: Array) -> tuple[Array, Array]:
         """Rows and force of some pieces, (pieces, points, 1 + 2 dim, rows or components).
 
         origin: of their cells [m], (pieces, dim); g: velocity of the surface at their corners [m/s].
         """
-        dim, sizes = at.dim, at.sizes[some]
+        dim, sizes, (symbols, *parts) = at.dim, at.sizes[some], self._built
         ends = np.concatenate([np.zeros((1, dim)), np.eye(dim)])
         there = barycentric(origin[:, None] + ends * sizes[:, None], at.x[some]) @ g
         slope = np.swapaxes(there[:, 1:] - there[:, :1], 1, 2) / sizes[:, None]
         numbers = [*_numbers(at, some, np.zeros(len(g))), origin, there[:, 0], slope, np.zeros((len(g), dim + 1))]
-        rows, force = (
-            part.on(at.cell[some], {self._of_pieces: _beside(numbers)}) for part in (self._rows, self._force)
-        )
+        rows, force = (part.on(at.cell[some], {symbols: _beside(numbers)}) for part in parts)
         return rows, force.reshape(*rows.shape[:3], dim)
 
 
@@ -68,9 +71,14 @@ class MeanIntegrands:
 
     def __init__(self, domain: fem.Domain, flow: forms.Coefficients):
         """flow: coefficients in cut cells."""
-        self._dim = dim = domain.dim
+        self._domain, self._flow = domain, flow
+
+    @cached_property
+    def _built(self) -> tuple[Any, fem.Pointwise]:
+        """(numbers of pieces, the derivatives)."""
+        domain, flow, dim = self._domain, self._flow, self._domain.dim
         vector, tensor = (dim,), (dim, dim)
-        self._of_pieces, (n, parameters, x, w, p, du, dp, tests, dv) = _symbols(
+        numbers, (n, parameters, x, w, p, du, dp, tests, dv) = _symbols(
             domain, vector, (PARAMETERS,), vector, vector, (1,), tensor, vector, (2 * dim + 1,), tensor
         )
         n, parameters, tests, dv = (ufl.variable(part) for part in (n, parameters, tests, dv))
@@ -81,7 +89,7 @@ class MeanIntegrands:
         moved, of_dv, each = _moved(ufl.diff(f, tests), n, parameters=parameters), ufl.diff(f, dv), range(dim)
         slopes = [ufl.grad(of_dv[i, k])[j] for k in each for i in each for j in each]
         what = "the flow's derivative by the motion of surfaces"
-        self._pointwise = fem.Pointwise(domain, ufl.as_vector([*moved, *slopes]), np.zeros((1, dim)), what)
+        return numbers, fem.Pointwise(domain, ufl.as_vector([*moved, *slopes]), np.zeros((1, dim)), what)
 
     def on(self, at: InterfaceTerms, origin: Array, inertia: Array, means: Array, slopes: Array) -> tuple[Array, Array]:
         """(by test functions e_i of momentum, 1 and x_k of continuity, (pieces, 2 dim + PARAMETERS, 2 dim + 1); slopes
@@ -93,7 +101,8 @@ class MeanIntegrands:
         pieces, dim = origin.shape
         parts, tests = 2 * dim + PARAMETERS, 2 * dim + 1
         numbers = [*_numbers(at, slice(None), inertia), origin, means, slopes, np.zeros((pieces, tests + dim**2))]
-        found = self._pointwise.on(at.cell, {self._of_pieces: _beside(numbers)})[:, 0]
+        symbols, pointwise = self._built
+        found = pointwise.on(at.cell, {symbols: _beside(numbers)})[:, 0]
         return (
             found[:, : parts * tests].reshape(pieces, parts, tests),
             found[:, parts * tests :].reshape(pieces, dim, dim, dim),
