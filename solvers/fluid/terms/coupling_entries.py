@@ -47,8 +47,8 @@ def interface_entries(
     if isinstance(shape, CutDerivatives):
         rows, load_by_shape = shape.rows, shape.force
         if of_sweep is not None:
-            rows[..., :-1] += of_sweep.momentum.transpose(0, 1, 3, 4, 2)
-            rows[..., -1] += of_sweep.continuity
+            rows[..., :-1] += of_sweep.momentum
+            rows[..., -1:] += of_sweep.continuity
         into = sums.with_flow(alpha * C + shape.operator, rows)
     else:
         by_shape, load_by_shape = shape_derivatives(operator, flow)
@@ -56,11 +56,9 @@ def interface_entries(
             for part in (by_shape.fields, by_shape.psi, load_by_shape):
                 part[shape.pieces] = 0.0
             load_by_shape[shape.pieces] += shape.force
-        into = sums.with_flow(alpha * C + by_shape)
+        into = sums.with_flow(alpha * C + by_shape, *(() if of_sweep is None else of_sweep.rows(operator)))
         if shape is not None:
             into = into + sums.of_films(shape)
-        if of_sweep is not None:
-            into = into + sums.of_films(of_sweep.blocks(operator))
     if of_sweep is not None:
         load_by_shape = load_by_shape + of_sweep.force
     into.data[held[into.indices]] = 0.0
@@ -75,19 +73,19 @@ def interface_entries(
 class _OfSweep:
     """Derivatives of all pieces by the velocity of their facets."""
 
-    momentum: Array  #: (pieces, functions, dim, vertices, dim)
-    continuity: Array  #: (pieces, functions, vertices, dim)
+    momentum: Array  #: (pieces, functions, vertices, dim, dim), component of rows last
+    continuity: Array  #: (pieces, functions, vertices, dim, 1)
     force: Array  #: (pieces, vertices, vertices, dim, dim), component of force first
 
-    def blocks(self, operator: InterfaceTerms) -> FilmDerivatives:
-        momentum, continuity = self.momentum.transpose(0, 3, 4, 1, 2), self.continuity.transpose(0, 2, 3, 1)
-        size = operator.u[0].size if len(operator.u) else 0
-        return FilmDerivatives(
-            np.arange(len(momentum)),
-            np.concatenate([operator.u.reshape(len(momentum), size), operator.p], axis=1),
-            np.concatenate([momentum.reshape(*continuity.shape[:3], size), continuity], axis=3),
-            self.force,
-        )
+    def rows(self, operator: InterfaceTerms) -> list[Array]:
+        """As `_Sums.with_flow` takes them."""
+        parts = [self.momentum, self.continuity]
+        return [np.concatenate(parts, axis=4)] if _together(operator) else parts
+
+
+def _together(operator: InterfaceTerms) -> bool:
+    """The functions of velocity are those of pressure."""
+    return operator.u.shape[1] == operator.p.shape[1]
 
 
 def _of_sweep(operator: InterfaceTerms, by_motion: Array) -> _OfSweep:
@@ -99,8 +97,8 @@ def _of_sweep(operator: InterfaceTerms, by_motion: Array) -> _OfSweep:
     flux = (C.psi[:, None] @ by_motion).reshape(pieces, 1, vertices, dim)
     load = (operator.penalty @ by_motion).reshape(pieces, 1, dim, vertices, dim).swapaxes(2, 3)
     return _OfSweep(
-        momentum.reshape(pieces, functions, dim, vertices, dim),
-        operator.psi.sum(axis=2)[:, :, None, None] * flux,
+        momentum.reshape(pieces, functions, dim, vertices, dim).transpose(0, 1, 3, 4, 2),
+        (operator.psi.sum(axis=2)[:, :, None, None] * flux)[..., None],
         -operator.mass_of_pieces.sum(axis=2)[:, :, None, None, None] * load,
     )
 
@@ -116,7 +114,7 @@ class _Sums:
         self._corner = corner[self._ours]
         self._shape = (len(vertices), unknowns.local)
         self._u, self._p = operator.u, operator.p
-        self._together = operator.u.shape[1] == operator.p.shape[1]  #: the functions of velocity are those of pressure
+        self._together = _together(operator)
         if self._together:
             self._both = self._beside(np.concatenate([operator.u, operator.p[..., None]], axis=2), operator.fields)
         else:
@@ -136,19 +134,20 @@ class _Sums:
         columns = np.ascontiguousarray(numbers[:, 0])
         return OverlappingBlocks(rows, columns, numbers, weights, pieces, self._shape, self._shape[1])
 
-    def with_flow(self, coefficients: MotionOperator, blocks: Array | None = None) -> Sparse:
+    def with_flow(self, coefficients: MotionOperator, *blocks: Array) -> Sparse:
         """The transposed matrix of an operator; columns are local dofs of the flow.
 
-        blocks: added to it, for first degree, (pieces, functions, vertices, dim, dim + 1).
+        blocks: added to it, none or for first degree (pieces, functions, vertices, dim, dim + 1), for second degree
+        those of momentum and of continuity.
         """
+        more = [part[self._ours].reshape(-1, *part.shape[3:]) for part in blocks]
         velocity = np.swapaxes(coefficients.fields[self._ours], 2, 3)
         pressure = coefficients.psi[self._ours][:, None, :, None]
         if self._together:
             both = np.zeros((*velocity.shape[:3], self._dim + 1))
             both[..., :-1], both[:, :1, :, -1:] = velocity, pressure
-            more = None if blocks is None else blocks[self._ours].reshape(-1, *both.shape[2:])
-            return self._both.matrix(both, more).ordered()
-        return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
+            return self._both.matrix(both, *more).ordered()
+        return (self._velocity.matrix(velocity, *more[:1]) + self._pressure.matrix(pressure, *more[1:])).ordered()
 
     def of_films(self, films: FilmDerivatives) -> Sparse:
         """The transposed matrix of the derivatives of rows in films; columns are local dofs of the flow."""
