@@ -82,7 +82,9 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "films": (
         (
             "solvers/fluid/cut/film.py", "solvers/fluid/cut/gaps.py", "solvers/fluid/terms/gap_terms.py",
-            *(f"solvers/fluid/terms/shape_derivatives/{name}.py" for name in ("film_crossings", "film_shape")),
+            *(f"solvers/fluid/terms/shape_derivatives/{name}.py" for name in (
+                "film_crossings", "film_shape", "surface_integrands",
+            )),
         ),
         ("film_crossings", "fluid_film", "fluid_film_shape", "fluid_gap", "fluid_gaps", "fluid_closing",
          "fsci_lubrication", "constants"),

@@ -38,6 +38,7 @@ from solvers.fem.forms import (
 )
 from solvers.fem.ghosts import accumulate, add_ghosts, share_owned, sum_ghosts
 from solvers.fem.points import average_at_nodes, cell_midpoints, evaluate_cells, locate_point, reference_nodes, tabulate
+from solvers.fem.pointwise import Pointwise, numbers_of_cells
 from solvers.fem.quadrature import Entities, cell_quadrature, facet_quadrature
 from solvers.fem.spaces import (
     block_points,

@@ -12,7 +12,7 @@ from typing import Any
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import cpp, fem, la
+from dolfinx import cpp, fem, jit, la
 from dolfinx import mesh as dolfinx_mesh
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
@@ -212,6 +212,11 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any) -> None:
 def compile_expression(expression: Any, points: Array, options: dict[str, Any]) -> Any:
     """An expression at reference points of cells."""
     return fem.Expression(expression, points, jit_options=options)
+
+
+def tabulator(comm: MPI.Comm, expression: Any, points: Array, options: dict[str, Any]) -> Any:
+    """What the form compiler makes of an expression at reference points of cells."""
+    return jit.ffcx_jit(comm, (expression, points), jit_options=options)[0]
 
 
 def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices32) -> Array:

@@ -176,6 +176,11 @@ def compile_expression(expression: Any, points: Array, options: dict[str, Any]) 
     return fem.Expression(expression, points, jit_params=options)
 
 
+def tabulator(comm: MPI.Comm, expression: Any, points: Array, options: dict[str, Any]) -> Any:
+    """What the form compiler makes of an expression at reference points of cells."""
+    return jit.ffcx_jit(comm, (expression, points), jit_params=options)[0]
+
+
 def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices32) -> Array:
     """Values in cells, shape (cells, points * components)."""
     return expression.eval(cells)

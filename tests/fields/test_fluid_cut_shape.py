@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import ufl
 from fluid_setup import body, circle, field, loop, make_fluid, sphere, step, with_slip
 
 from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms import forms
 from solvers.fluid.terms.boundary.patches import Patch
 from solvers.fluid.terms.coupling_entries import interface_entries
 
@@ -123,10 +125,43 @@ def test_a_body_through_a_wall_of_the_box(dim):
     [
         (2, 0.05, 0.0, 0.05, 0.09),  # the derivatives that assume u = g: 0.92
         (3, 0.5, 0.0, 0.05, 0.11),  # 0.73
-        (2, 0.0, 1e-5, 0.05, 0.08),  # 0.81; without the terms of `compliant_shape` 0.14
+        (2, 0.0, 1e-5, 0.05, 0.08),  # 0.81; without what slip and layers change 0.14
         (2, 0.05, 1e-5, 0.05, 0.18),  # 0.94; 0.63
         (3, 0.05, 1e-5, 2.0, 0.08),  # without the slip's part of the gradient 0.094
     ],
 )
 def test_with_slip_and_a_layer(dim, slip, layer, mu, bound):
     assert (errors(dim, slip=slip, layer=layer, mu=mu) < bound).all()
+
+
+def with_more(flow, u, p, v, q, bulk=forms.bulk):
+    """Integrand of the flow and of terms that multiply each of v, grad v, q and grad q."""
+    u2, more = ufl.dot(u, u), p * ufl.inner(ufl.grad(u), ufl.grad(v)) - ufl.dot(ufl.grad(p), ufl.grad(q))
+    return bulk(flow, u, p, v, q) + 3.0 * u2 * ufl.dot(u, v) + u2 * q + more
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_term_of_the_forms_alone(dim, monkeypatch):
+    """Terms that `forms` alone has are differentiated: what they add is exact, row by row, in any flow."""
+    added, walls = (
+        [],
+        [Patch("walls", ("x-", "x+", "y-", "y+", "z-", "z+")[: 2 * dim], "traction", field(*[0.0] * dim))],
+    )
+    for bulk in (with_more, forms.bulk):
+        monkeypatch.setattr(forms, "bulk", bulk)
+        moving, some = Moving(dim, walls), np.random.default_rng(3)
+        system = moving.fluid.system
+        system.history.x.array[:] = some.normal(size=len(system.history.x.array))
+        moving.fluid.flow[:] = some.normal(size=len(moving.fluid.flow))
+        system.set_scales(np.where(moving.fluid.unknowns.velocity_mask, 0.6, 0.0))
+        added.append(moving.derivatives())
+    for (found, exact), (found_without, exact_without) in zip(*added, strict=True):
+        term = exact - exact_without
+        np.testing.assert_allclose(found - found_without, term, atol=1e-6 * max(np.abs(term).max(), 1e-3))
+    assert (
+        min(
+            np.abs(found - without).max()
+            for (found, _), (without, _) in zip(*(pairs[:2] for pairs in added), strict=True)
+        )
+        > 0.1
+    )

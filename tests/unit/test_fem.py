@@ -228,6 +228,39 @@ def test_expressions(square):
 
 
 @pytest.mark.parametrize("degree", [1, 2])
+def test_values_at_points_for_test_functions(square, degree):
+    """Their sum with the weights of a rule is the assembled form; given values replace those of a function."""
+    space, factor = fem.flow_space(square, degree), fem.function(fem.cellwise_space(square))
+    flow, test = fem.function(space), ufl.TestFunction(space)
+    flow.x.array[:] = np.random.default_rng(1).normal(size=len(flow.x.array))
+    factor.x.array[:] = 3.0, -2.0
+    integrand = fem.constant(square, 2.0) * factor * ufl.dot(flow, test) + ufl.inner(ufl.grad(flow), ufl.grad(test))
+    points, weights = fem.quadrature_points(square, 4)
+    pointwise, cells = fem.Pointwise(square, integrand, points, "a test"), np.array([1, 0, 1], dtype=np.int32)
+    values = pointwise.on(cells)
+    dofs = fem.cell_blocks(space)[:, :, None] * space.dofmap.index_map_bs + np.arange(space.dofmap.index_map_bs)
+    exact, total = np.zeros(len(flow.x.array)), np.zeros(len(flow.x.array))
+    fem.assemble_vector(fem.compile_form(integrand * fem.volume_measure(square, 4)), exact)
+    np.add.at(total, dofs[cells[:2]].reshape(2, -1), np.einsum("q,cqa->ca", weights, values[:2]))
+    np.testing.assert_allclose(total, exact, atol=1e-13)
+    np.testing.assert_array_equal(values[2], values[0])
+    given = pointwise.on(cells[2:], {factor: np.array([[-2.0]])})
+    np.testing.assert_array_equal(given, values[2:])
+    assert np.abs(pointwise.on(cells[2:], {factor: np.array([[3.0]])}) - given).max() > 0.1
+    assert pointwise.on(cells[:0]).shape == (0, *values.shape[1:])
+
+
+def test_numbers_of_cells_that_recur(square):
+    """Form compilers of DOLFINx 0.5 cannot name the tenth coefficient by its text."""
+    numbers = [fem.numbers_of_cells(square, 5) for _ in range(11)][-1]
+    moment = fem.Pointwise(square, numbers[2] * ufl.SpatialCoordinate(square.mesh)[0], np.array([[0.5, 0.5]]), "a test")
+    given = {numbers: np.arange(15.0).reshape(3, 5)}
+    middle = fem.cell_midpoints(square)[0]
+    found = moment.on(np.array([0, 1, 1], dtype=np.int32), given)
+    np.testing.assert_allclose(found[:, 0], [2.0 * middle[0], 7.0 * middle[1], 12.0 * middle[1]])
+
+
+@pytest.mark.parametrize("degree", [1, 2])
 def test_flow_spaces(square, degree):
     """Velocity and pressure dofs are all different, together all there are, and lie at the nodes of the lattice."""
     space = fem.flow_space(square, degree)

@@ -45,7 +45,7 @@ from solvers.fluid.terms.interface import InterfaceTerms
 from solvers.fluid.terms.poorly_cut.ghost import Scales
 from solvers.fluid.terms.poorly_cut.ghost_choice import choose_cut_penalty
 from solvers.fluid.terms.shape_derivatives.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
-from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives, FilmFlow, film_derivatives
+from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives, film_derivatives
 from solvers.fluid.terms.slip_history import slip_of_facets
 from solvers.mesh.distributed import Nodal
 
@@ -229,26 +229,24 @@ class FlowSystem:
     def shape_derivatives(self, *, improved: bool) -> FilmDerivatives | CutDerivatives | None:
         """Derivatives by the motion of surfaces: of first-degree flows in time, or in films (collective).
 
-        None in steady first-degree flows, where the first increments would be too large, with slip in films, and
-        without films. improved: the step has an increment; before, there are no derivatives in films.
+        None in steady first-degree flows, where the first increments would be too large, and without films. improved:
+        the step has an increment; before, there are no derivatives in films.
         """
         at, cut, settings, degree = self.assemble_interface(), self.cut, self.settings, self.settings.degree
         assert cut is not None
-        if (at.slips or not improved) if degree > 1 else settings.steady:
+        if not improved if degree > 1 else settings.steady:
             return None
-        rate = np.zeros(self.unknowns.local) if settings.steady else self.history.x.array
-        if settings.body_force is not None:
-            rate = rate + self._force.x.array / settings.density
         flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
         g = at.at_corners(cut.motion.v, self.sweep_velocity)
         if degree > 1:
-            return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha, g))
-        scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
+            assert self.forms.films is not None
+            return film_derivatives(at, self.unknowns, self.weights, cut, self.forms.films, g)
         assert self.gaps is not None
+        assert self.forms.moving is not None
         # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
         moved = self._moved if improved and self.may_close is None else np.inf
-        alphas = alpha, float(self._scale_alpha.value)
-        state = FlowTerms(flow, rate, scale, density, *alphas, convection, settings.penalties, self.gaps, moved, g)
+        terms = settings.convection, settings.penalties, self.forms.moving, self.gaps
+        state = FlowTerms(flow, density, alpha, *terms, moved, g)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     def assemble_zone(self) -> ClosedZone | None:
@@ -293,23 +291,9 @@ class FlowSystem:
     def end_step(self) -> None:
         """Accept the step (collective)."""
         if self.gaps is not None:
-            self.gaps.end_step(self._in_the_middle)
+            assert self.forms.flow_in_gaps is not None
+            self.gaps.end_step(self.forms.flow_in_gaps)
         self.settle()
-
-    def _in_the_middle(self, cells: NDArray[np.int32]) -> tuple[Array, Array]:
-        """Residual of the momentum equation [N/m^3] and a [m/s] in the middle of some cells, (cells, dim)."""
-        settings, u, p = self.settings, self.unknowns.cell_velocity[cells], self.unknowns.cell_pressure[cells]
-        values, slopes = fem.tabulate_lagrange(self.grid.domain, 1, np.full((1, self.grid.dim), 0.5))
-        gradient = slopes[0] / self.grid.sizes[cells][:, None]
-        flow, history, a = (f.x.array for f in (self.flow, self.history, self._scale_velocity))
-        velocity, rate, a = (values[0] @ some[u] for some in (flow, history, a))
-        strong = settings.density * (float(self._alpha.value) * velocity - rate)
-        if settings.body_force is not None:
-            strong -= values[0] @ self._force.x.array[u]
-        strong += np.einsum("ca,cai->ci", flow[p], gradient)
-        if settings.convection:
-            strong += settings.density * np.einsum("cak,cai,ci->ck", flow[u], gradient, velocity)
-        return strong, a * settings.convection
 
     def settle(self) -> None:
         """Set the values of nodes without fluid by extension (collective)."""

@@ -1,10 +1,11 @@
-"""The compiled forms of the flow over cells: bulk, stabilisation, interface."""
+"""The compiled forms of the flow over cells: bulk, stabilisation, interface, and the integrands of some at points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import ufl
 
 from solvers import fem
@@ -12,6 +13,7 @@ from solvers.fluid.cut.weights import Weights
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.terms import forms, nitsche
+from solvers.fluid.terms.shape_derivatives.surface_integrands import FilmIntegrands, MeanIntegrands
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,11 @@ class CellForms:
 
     residuals: tuple[fem.Integral, ...]
     tangents: tuple[fem.Integral, ...]
+    flow_in_gaps: fem.Pointwise | None = None  #: `forms.flow_in_gaps` in the middle of cells
+    #: for the derivatives by the motion of surfaces, at the points of cut cells: integrands over the fluid by test
+    #: function, for first degree what is added in gaps, and the terms of surfaces
+    moving: tuple[fem.Pointwise, fem.Pointwise, MeanIntegrands] | None = None
+    films: tuple[fem.Pointwise, FilmIntegrands] | None = None
 
     def integrals(self) -> list[fem.Integral]:
         """Forms to compile at the start; those of films are compiled when a film appears."""
@@ -78,10 +85,19 @@ def cell_forms(
     without, cut_without = (replace(terms, force=forms.nothing(unknowns.grid.dim)) for terms in both)
     same_slope = _residuals(unknowns, (without, cut_without), function, test, weights, gaps)
     tangents = [ufl.derivative(form, function, trial) for form in same_slope]
-    return CellForms(
+    found = CellForms(
         tuple(fem.Integral(domain, form) for form in residuals),
         tuple(fem.Integral(domain, form) for form in tangents),
     )
+    if weights is None:
+        return found
+    parts, what = (*unknowns.parts(function), *unknowns.parts(test)), "the flow's derivative by the motion of surfaces"
+    points, middle = weights.reference, np.full((1, domain.dim), 0.5)
+    in_cut, special = (fem.Pointwise(domain, some, points, what) for some in _on_cut(*both, parts, gaps))
+    if gaps is None:
+        return replace(found, films=(special, FilmIntegrands(domain, both[1], parts, points)))
+    in_gaps = fem.Pointwise(domain, forms.flow_in_gaps(flow, gaps, *parts[:2]), middle, "the flow in gaps")
+    return replace(found, flow_in_gaps=in_gaps, moving=(in_cut, special, MeanIntegrands(domain, both[1])))
 
 
 def _residuals(
@@ -94,16 +110,26 @@ def _residuals(
 ) -> list[Any]:
     """Forms over uncut cells and, with weights, over cut ones and films; in gaps: what is added in cut, uncut cells."""
     domain, degree, (flow, cut) = unknowns.grid.domain, unknowns.degree, of
-    (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
-    everywhere, in_cut = (forms.bulk(f, u, p, v, q) + forms.residual_based(f, u, p, v, q) for f in of)
-    uncut = everywhere * fem.measure(domain, "dx", 2 * degree + 1)
+    parts = *unknowns.parts(function), *unknowns.parts(test)
+    dx = fem.measure(domain, "dx", 2 * degree + 1)
+    uncut = _everywhere(flow, *parts) * dx
     if weights is None:
         return [uncut]
     dx_cut = fem.measure(domain, "dx", weights.degree)
-    on_interface = nitsche.own(cut, weights, u, p, v, q)
+    on_interface = nitsche.own(cut, weights, *parts)
+    in_cut, special = (weights.fluid * integrand for integrand in _on_cut(flow, cut, parts, gaps))
+    whole = in_cut * dx_cut + on_interface * dx_cut
     if gaps is not None:
-        added = forms.in_gaps(flow, gaps, u, p, q)
-        whole = weights.fluid * in_cut * dx_cut + on_interface * dx_cut
-        return [uncut, whole, weights.fluid * added * dx_cut, added * fem.measure(domain, "dx", 2 * degree + 1)]
-    film = forms.film(cut, u, p, v, q)
-    return [uncut, *(weights.fluid * bulk * dx_cut + on_interface * dx_cut for bulk in (in_cut, film))]
+        return [uncut, whole, special * dx_cut, forms.in_gaps(flow, gaps, *parts) * dx]
+    return [uncut, whole, special * dx_cut + on_interface * dx_cut]
+
+
+def _on_cut(
+    flow: forms.Coefficients, cut: forms.Coefficients, parts: tuple[Any, ...], gaps: forms.GapScales | None
+) -> list[Any]:
+    """Integrands over the fluid in cut cells, and in films; in gaps: what is added there. parts: u, p, v, q."""
+    return [_everywhere(cut, *parts), forms.film(cut, *parts) if gaps is None else forms.in_gaps(flow, gaps, *parts)]
+
+
+def _everywhere(flow: forms.Coefficients, u: Any, p: Any, v: Any, q: Any) -> Any:
+    return forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)

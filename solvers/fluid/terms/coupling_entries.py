@@ -10,7 +10,7 @@ In films S and S_f are those of `film_shape`. Those of `cut_shape` are taken in 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,23 +47,20 @@ def interface_entries(
     if isinstance(shape, CutDerivatives):
         rows, load_by_shape = shape.rows, shape.force
         if of_sweep is not None:
-            rows = rows + np.concatenate(
-                [of_sweep.momentum.transpose(0, 1, 3, 4, 2), of_sweep.continuity[..., None]], axis=4
-            )
+            rows[..., :-1] += of_sweep.momentum
+            rows[..., -1:] += of_sweep.continuity
         into = sums.with_flow(alpha * C + shape.operator, rows)
     else:
         by_shape, load_by_shape = shape_derivatives(operator, flow)
         if shape is not None:
             for part in (by_shape.fields, by_shape.psi, load_by_shape):
                 part[shape.pieces] = 0.0
-            load_by_shape[shape.pieces] += shape.force.transpose(0, 1, 3, 2, 4)
-        into = sums.with_flow(alpha * C + by_shape)
+            load_by_shape[shape.pieces] += shape.force
+        into = sums.with_flow(alpha * C + by_shape, *(() if of_sweep is None else of_sweep.rows(operator)))
         if shape is not None:
             into = into + sums.of_films(shape)
-        if of_sweep is not None:
-            into = into + sums.of_films(of_sweep)
     if of_sweep is not None:
-        load_by_shape = load_by_shape + of_sweep.force.transpose(0, 1, 3, 2, 4)
+        load_by_shape = load_by_shape + of_sweep.force
     into.data[held[into.indices]] = 0.0
     back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
@@ -72,17 +69,37 @@ def interface_entries(
     return InterfaceEntries(into, back, load)
 
 
-def _of_sweep(operator: InterfaceTerms, by_motion: Array) -> FilmDerivatives:
-    """Derivatives of all pieces by the velocity of their facets; by_motion: its own, (pieces, k, vertices, j)."""
-    C, D = operator.coupling, by_motion
-    of_facet = np.einsum("paf,pfik->paik", operator.fields.sum(axis=2), C.fields)
-    flux = np.einsum("pk,pkcj->pcj", C.psi, D)
-    load = np.einsum("pki,pkcj->picj", operator.penalty, D)
-    return FilmDerivatives(
-        np.arange(len(D)),
-        np.einsum("paik,pkcj->paicj", of_facet, D),
-        np.einsum("pa,pcj->pacj", operator.psi.sum(axis=2), flux),
-        -np.einsum("pv,picj->pvicj", operator.mass_of_pieces.sum(axis=2), load),
+@dataclass(frozen=True)
+class _OfSweep:
+    """Derivatives of all pieces by the velocity of their facets."""
+
+    momentum: Array  #: (pieces, functions, vertices, dim, dim), component of rows last
+    continuity: Array  #: (pieces, functions, vertices, dim, 1)
+    force: Array  #: (pieces, vertices, vertices, dim, dim), component of force first
+
+    def rows(self, operator: InterfaceTerms) -> list[Array]:
+        """As `_Sums.with_flow` takes them."""
+        parts = [self.momentum, self.continuity]
+        return [np.concatenate(parts, axis=4)] if _together(operator) else parts
+
+
+def _together(operator: InterfaceTerms) -> bool:
+    """The functions of velocity are those of pressure."""
+    return operator.u.shape[1] == operator.p.shape[1]
+
+
+def _of_sweep(operator: InterfaceTerms, by_motion: Array) -> _OfSweep:
+    """by_motion: of the velocity of facets, (pieces, k, vertices, j)."""
+    C, (pieces, dim, vertices, _) = operator.coupling, by_motion.shape
+    functions, by_motion = operator.u.shape[1], by_motion.reshape(pieces, dim, vertices * dim)
+    of_facet = operator.fields.sum(axis=2) @ C.fields.reshape(pieces, 1 + dim, dim**2)
+    momentum = of_facet.reshape(pieces, functions * dim, dim) @ by_motion
+    flux = (C.psi[:, None] @ by_motion).reshape(pieces, 1, vertices, dim)
+    load = (operator.penalty @ by_motion).reshape(pieces, 1, dim, vertices, dim).swapaxes(2, 3)
+    return _OfSweep(
+        momentum.reshape(pieces, functions, dim, vertices, dim).transpose(0, 1, 3, 4, 2),
+        (operator.psi.sum(axis=2)[:, :, None, None] * flux)[..., None],
+        -operator.mass_of_pieces.sum(axis=2)[:, :, None, None, None] * load,
     )
 
 
@@ -97,7 +114,7 @@ class _Sums:
         self._corner = corner[self._ours]
         self._shape = (len(vertices), unknowns.local)
         self._u, self._p = operator.u, operator.p
-        self._together = operator.u.shape[1] == operator.p.shape[1]  #: the functions of velocity are those of pressure
+        self._together = _together(operator)
         if self._together:
             self._both = self._beside(np.concatenate([operator.u, operator.p[..., None]], axis=2), operator.fields)
         else:
@@ -117,19 +134,20 @@ class _Sums:
         columns = np.ascontiguousarray(numbers[:, 0])
         return OverlappingBlocks(rows, columns, numbers, weights, pieces, self._shape, self._shape[1])
 
-    def with_flow(self, coefficients: MotionOperator, blocks: Array | None = None) -> Sparse:
+    def with_flow(self, coefficients: MotionOperator, *blocks: Array) -> Sparse:
         """The transposed matrix of an operator; columns are local dofs of the flow.
 
-        blocks: added to it, for first degree, (pieces, functions, vertices, dim, dim + 1).
+        blocks: added to it, none or for first degree (pieces, functions, vertices, dim, dim + 1), for second degree
+        those of momentum and of continuity.
         """
+        more = [part[self._ours].reshape(-1, *part.shape[3:]) for part in blocks]
         velocity = np.swapaxes(coefficients.fields[self._ours], 2, 3)
         pressure = coefficients.psi[self._ours][:, None, :, None]
         if self._together:
             both = np.zeros((*velocity.shape[:3], self._dim + 1))
             both[..., :-1], both[:, :1, :, -1:] = velocity, pressure
-            more = None if blocks is None else blocks[self._ours].reshape(-1, *both.shape[2:])
-            return self._both.matrix(both, more).ordered()
-        return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
+            return self._both.matrix(both, *more).ordered()
+        return (self._velocity.matrix(velocity, *more[:1]) + self._pressure.matrix(pressure, *more[1:])).ordered()
 
     def of_films(self, films: FilmDerivatives) -> Sparse:
         """The transposed matrix of the derivatives of rows in films; columns are local dofs of the flow."""
@@ -137,12 +155,9 @@ class _Sums:
         pieces = films.pieces[some]
         corner = np.cumsum(self._ours)[pieces] - 1
         rows = self._corner[corner][:, :, None] * self._dim + np.arange(self._dim)
-        entries = []
-        for dofs, blocks in ((self._u[pieces], films.momentum[some]), (self._p[pieces], films.continuity[some])):
-            columns = dofs.reshape(*dofs.shape, 1, 1)
-            motion = rows.reshape(len(rows), *[1] * (dofs.ndim - 1), *rows.shape[1:])
-            entries.append([np.broadcast_to(part, blocks.shape).ravel() for part in (motion, columns, blocks)])
-        into, by, values = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        blocks = films.rows[some]
+        into, by = rows[..., None], films.dofs[some][:, None, None]
+        into, by, values = (np.broadcast_to(part, blocks.shape).ravel() for part in (into, by, blocks))
         return sparse_from_entries(into, by, values, (self._shape[0] * self._dim, self._shape[1]))
 
     def with_surface(self, blocks: Array) -> Sparse:

@@ -1,6 +1,6 @@
 """Weak forms of the flow on a cut grid: bulk, stabilisation, ghost penalty. The terms at surfaces are in `nitsche`.
 
-sigma(u, p) = 2 mu eps(u) - p I is the stress and h an edge length of the cell. The time derivative is
+h is an edge length of the cell. The time derivative is
 alpha u - history, with alpha = 0 in steady flow. `a` is the velocity that scales the stabilisation: that of an earlier
 step or iterate.
 Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300; Schott, Wall, ibid. 276 (2014)
@@ -87,10 +87,6 @@ def eps(u: Expr) -> Expr:
     return sym(grad(u))
 
 
-def sigma(flow: Coefficients, u: Expr, p: Expr) -> Expr:
-    return viscous_stress(flow, u) - p * ufl.Identity(len(u))
-
-
 def viscous_stress(flow: Coefficients, u: Expr) -> Expr:
     """2 mu eps(u)."""
     return 2.0 * flow.viscosity(u) * eps(u)
@@ -129,17 +125,19 @@ def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Ex
     return _tested(flow, u, p, test) + grad_div
 
 
-def in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr, q: Expr) -> Expr:
-    """Integrand of (tau (R - past), grad q) - (T R, grad q) along the walls of a gap, T that of `residual_based`.
-
-    tau = (rho^2 a . G a + friction^2)^(-1/2).
-    """
+def in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand of -(B + T R, grad q) along the walls of a gap, with B of `flow_in_gaps` and T of `residual_based`."""
     metric, common, viscous = _rates(flow)
     strong, test = dot(gaps.tangents, inertia(flow, u) + grad(p)), dot(gaps.tangents, grad(q))
-    past, tau = dot(gaps.tangents, gaps.past), 1.0 / sqrt(gaps.friction**2 + _convective(flow))
     taus = [1.0 / sqrt(common + viscous * len(metric) * g**2) for g in metric]
-    added = (tau * (strong[i] - past[i]) - elsewhere * strong[i] for i, elsewhere in enumerate(taus))
-    return gaps.share * sum(test[i] * value for i, value in enumerate(added))
+    B = flow_in_gaps(flow, gaps, u, p)
+    return -gaps.share * sum(test[i] * (B[i] + elsewhere * strong[i]) for i, elsewhere in enumerate(taus))
+
+
+def flow_in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr) -> Expr:
+    """B = -tau (R - past) along the walls of a gap [m/s], tau = (rho^2 a . G a + friction^2)^(-1/2)."""
+    tau = 1.0 / sqrt(gaps.friction**2 + _convective(flow))
+    return -tau * dot(gaps.tangents, inertia(flow, u) + grad(p) - gaps.past)
 
 
 def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:

@@ -6,8 +6,6 @@ gap would vanish as steps get smaller. In cells that were in no gap, B = -R / fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import ufl
 from mpi4py import MPI
@@ -89,29 +87,15 @@ class GapTerms:
             function.x.array[:] = 0.0
             function.x.array[marked] = (inertia * component)[row]
 
-    def end_step(self, strong: Callable[[Indices32], tuple[Array, Array]]) -> None:
-        """Keep B of the step (collective). strong: cells -> R [N/m^3] and a [m/s] at their middle, (cells, dim)."""
+    def end_step(self, flow: fem.Pointwise) -> None:
+        """Keep B of the step (collective). flow: B [m/s] in the middle of cells."""
         if self.marked is None or not self._inertia:
             self.memory = self.memory[:0]
             return
         cells = self.among(np.arange(self._grid.owned, dtype=np.int32))
-        R, a = strong(cells)
-        B = self.flow(cells, R[:, None], a[:, None])[:, 0]
-        found = np.concatenate([self._grid.numbers[cells, None], B], axis=1)
+        found = np.concatenate([self._grid.numbers[cells, None], flow.on(cells)[:, 0]], axis=1)
         everywhere = np.concatenate(self._grid.comm.allgather(found))
         self.memory = everywhere[np.unique(everywhere[:, 0], return_index=True)[1]]
-
-    def flow(self, cells: Indices32, strong: Array, a: Array) -> Array:
-        """B [m/s] at points of local cells, with the residual [N/m^3] and a [m/s], shape (cells, points, dim)."""
-        past, friction = np.stack([part.x.array[cells] for part in self._past], axis=1), self._friction.x.array[cells]
-        convective = self._density**2 * (4.0 / self._grid.sizes[cells][:, None] ** 2 * a**2).sum(axis=2)
-        against: Array = (strong - past[:, None]) @ self.share_and_tangents(cells)[1]
-        return -against / np.sqrt(convective + friction[:, None] ** 2)[..., None]
-
-    def share_and_tangents(self, cells: Indices32) -> tuple[Array, Array]:
-        """Share of the term (n,) and projectors (n, dim, dim) in some local cells."""
-        tangents = np.stack([part.x.array[cells] for part in self._tangents], axis=1)
-        return self._share.x.array[cells], tangents.reshape(len(cells), self._grid.dim, self._grid.dim)
 
     @property
     def narrow(self) -> NDArray[np.bool_]:

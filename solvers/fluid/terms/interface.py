@@ -99,7 +99,6 @@ class InterfaceTerms:
         self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow
         D, along = np.zeros_like(self.penalty), self.n[:, :, None] * self.n[:, None, :]
         tangents = np.eye(self.dim) - along
-        self.slips = slip_length is not None
         self.mobility: Array | None = None  #: kappa / mu of a layer [m^3/Pa s]
         if slip_length is not None:
             D += nitsche.compliance(slip_length[facet] / mu, tangents, self.penalty)

@@ -27,11 +27,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from ufl import dot, inner, outer, tr
+from ufl import dot
 
 from solvers.api import Array
 from solvers.fluid.settings.penalties import TRACE, Penalties
-from solvers.fluid.terms.forms import Coefficients, Expr, eps, sigma
+from solvers.fluid.terms.forms import Coefficients, Expr, viscous_stress
 
 #: Pieces that are evaluated together. Arrays at their quadrature points are large in 3D.
 PIECES_AT_ONCE = 256
@@ -39,13 +39,27 @@ PIECES_AT_ONCE = 256
 
 def own(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand over cut cells of the flow's own block; `weights` has the moments of n and P as coefficients."""
-    u_n = outer(u, weights.n)
-    return (
-        -dot(dot(sigma(flow, u, p), weights.n), v)
-        - inner(2.0 * flow.mu * eps(v), u_n)
-        - q * tr(u_n)
-        + dot(dot(weights.penalty, u), v)
-    )
+    return at_surface(flow, weights.n, weights.penalty, u, u, p, v, q)
+
+
+def at_surface(flow: Coefficients, n: Expr, P: Expr, w: Expr, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand -(t - p n) . v - w . (2 mu eps(v) n + q n) with w = u - g and t = 2 mu eps(u) n - P w: of N for h = 0.
+
+    It is linear in n and P, which may be moments.
+    """
+    return -dot(traction(flow, n, P, w, u) - p * n, v) - dot(w, dot(viscous_stress(flow, v), n)) - q * dot(w, n)
+
+
+def traction(flow: Coefficients, n: Expr, P: Expr, w: Expr, u: Expr) -> Expr:
+    """t = 2 mu eps(u) n - P w."""
+    return dot(viscous_stress(flow, u), n) - dot(P, w)
+
+
+def at_compliant_surface(
+    flow: Coefficients, n: Expr, P: Expr, D: Expr, w: Expr, u: Expr, p: Expr, v: Expr, q: Expr
+) -> Expr:
+    """Integrand of `at_surface` and of -<D t(u, g), t(v, 0)>."""
+    return at_surface(flow, n, P, w, u, p, v, q) - dot(dot(D, traction(flow, n, P, w, u)), traction(flow, n, P, v, v))
 
 
 def penalties(

@@ -12,8 +12,10 @@ Source of the layer: Frei, Gerosa, Burman, Fernandez, Comput. Methods Appl. Mech
 from __future__ import annotations
 
 import numpy as np
+from ufl import dot, grad
 
 from solvers.api import Array
+from solvers.fluid.terms.forms import Expr
 
 #: theta. The force of a film in contact is the same to 1 % from 10 to 1000.
 RELEASE = 100.0
@@ -25,6 +27,11 @@ def release(mobility: Array, sizes: Array) -> Array:
     mobility: kappa / mu [m^3/Pa s], (pieces,); sizes: edge lengths of the cells [m], (pieces, dim).
     """
     return RELEASE * mobility / sizes.min(axis=1) ** 2
+
+
+def layer(mobility: Expr, n: Expr, p: Expr, q: Expr) -> Expr:
+    """Integrand kappa / mu grad_t p . grad_t q."""
+    return mobility * (dot(grad(p), grad(q)) - dot(grad(p), n) * dot(grad(q), n))
 
 
 def seepage_terms(tangents: Array, area: Array, gradient: Array, mobility: Array, sizes: Array) -> Array:

@@ -15,17 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers import kernels
-from solvers.api import Array
+from solvers import fem, kernels
+from solvers.api import Array, Indices32
 from solvers.fluid.cut.cut import Cut
 from solvers.fluid.cut.weights import Weights
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.settings.penalties import TRACE, Penalties
 from solvers.fluid.terms.gap_terms import GapTerms
 from solvers.fluid.terms.interface import InterfaceTerms, MotionOperator
-from solvers.fluid.terms.shape_derivatives.compliant_shape import PenaltyChanges, compliant_terms, layer_by_motion
 from solvers.fluid.terms.shape_derivatives.film_crossings import barycentric, crossing_moments
 from solvers.fluid.terms.shape_derivatives.shape import normal_derivative
+from solvers.fluid.terms.shape_derivatives.surface_integrands import MeanIntegrands, along_normal
 
 #: Extent of a facet, in motions, from which on the end of a surface stays on it. Newton's method cycles in contact with
 #: 1; with 3, 10, 100 and 1,000 `torus_wall` on 8 x 8 x 13 cells takes 231, 235, 242 and 249 iterations in all, without
@@ -35,16 +35,14 @@ EXTENT_THAT_HOLDS = 10.0
 
 @dataclass(frozen=True)
 class FlowTerms:
-    """The iterate, and the coefficients of the forms; arrays at local dofs."""
+    """The iterate, and the terms of the flow."""
 
-    flow: Array  #: velocity [m/s] and pressure [Pa]
-    rate: Array  #: alpha times the history and f / rho [m/s^2]
-    scale: Array  #: velocity [m/s] that scales the stabilisation, zero without convection
+    flow: Array  #: velocity [m/s] and pressure [Pa], at local dofs
     density: float  #: [kg/m^3]
     alpha: float  #: [1/s]
-    scale_alpha: float  #: of the scales of the stabilisation [1/s]
     convection: bool
     penalties: Penalties
+    moving: tuple[fem.Pointwise, fem.Pointwise, MeanIntegrands]  #: of `CellForms`
     gaps: GapTerms
     moved: float  #: largest motion of a vertex in the last iterate [m], infinite in the first one
     velocity: Array  #: of the surface at the corners of pieces [m/s], (pieces, vertices, dim)
@@ -67,58 +65,48 @@ def cut_derivatives(
     In subscripts p: pieces, a: functions, c: vertices, i: rows of momentum and continuity, k, l: components, j:
     displacements.
     """
-    (n, mu, dim), mine = (at.n, at.mu, at.dim), np.flatnonzero(cut.cut[cut.pieces.cell] < grid.owned)
+    n, dim, mine = at.n, at.dim, np.flatnonzero(cut.cut[cut.pieces.cell] < grid.owned)
     local, moments = cut.cut[cut.pieces.cell[mine]], cut.pieces.moments[mine][:, rule.order]
-    pieces, identity = len(mine), np.eye(dim)
     _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
-    density = _density(local[first], at.u[first], at.p[first], at.sizes[first], mu, rule, state)
+    density = _density(local[first], state)
+    index = np.stack(np.unravel_index(grid.numbers[local], grid.grid.shape, order="F"), axis=1)
+    origin = np.stack([edge[i] for edge, i in zip(grid.grid.edges, index.T, strict=True)], axis=1)
 
-    slope = normal_derivative(at.x, n)
-    both, slopes = _means(at, state.flow)
-    du, dp, area = slopes[:, :dim], slopes[:, dim], moments.sum(axis=1)
+    means, slopes = _means(at, state.flow)
+    area = moments.sum(axis=1)
     share = area / np.maximum(area.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    w = both[:, :dim] - np.einsum("pc,pck->pk", share, state.velocity)
-    stress = mu * (du + np.swapaxes(du, 1, 2)) - both[:, dim, None, None] * identity
-    inertia = np.zeros(pieces) if at.slip_inertia is None else np.einsum("pc,pc->p", share, at.slip_inertia)
-    load = (stress @ n[:, :, None] - at.penalty @ w[:, :, None])[..., 0] + inertia[:, None] * n
+    means[:, :dim] -= np.einsum("pc,pck->pk", share, state.velocity)
+    inertia = np.zeros(len(n)) if at.slip_inertia is None else np.einsum("pc,pc->p", share, at.slip_inertia)
+    found, of_slopes = state.moving[2].on(at, origin, inertia, means, slopes)
+    f, along, by_shape = found[:, 0], found[:, 1 : 1 + dim], found[:, 1 + dim :]
+    of_force, operator = (
+        np.swapaxes(along[..., :dim], 1, 2),
+        MotionOperator(np.empty((len(n), 1 + dim, dim, dim)), along[..., dim]),
+    )
+    operator.fields[:, 0], operator.fields[:, 1:] = of_force, of_slopes
     g = cut.motion.v[at.corners].mean(axis=1) * state.convection
-    changes = _penalty_changes(at, g, slope, state, state.gaps.lengths(local))
-    more = compliant_terms(at, mu * (du + np.swapaxes(du, 1, 2)), w, slope, changes)
-    of_slip = du
-    if more is not None:
-        load, of_slip = load - more.load, du - more.gradient @ du
-    dload = -(at.penalty @ du) - n[:, :, None] * dp[:, None]
-    fields = np.empty((pieces, 1 + dim, dim, dim))
-    fields[:, 0] = -dload
-    fields[:, 1:] = -load[:, None, :, None] * identity[:, None] - mu * n[:, None, :, None] * of_slip[:, :, None]
-    fields[:, 1:] -= mu * n[:, :, None, None] * of_slip[:, None]
-    operator = MotionOperator(fields, -np.einsum("pkj,pk->pj", du, n))
+    stretch, changes = _changes(at, g, inertia, state)
+    changed = np.swapaxes(changes.reshape(len(n), changes.shape[1], dim**2), 1, 2) @ by_shape
+    by_motion = stretch[..., None] * f[:, None, None] + changed.reshape(*stretch.shape, f.shape[1])
 
-    of_load = (stress @ slope.reshape(pieces, dim, dim * dim)).reshape(slope.shape)
-    of_load -= _penalty_by_motion(at, slope, w, changes)
-    of_load += inertia[:, None, None, None] * (slope + n[:, :, None, None] * changes.length[:, None])
-    if more is not None:
-        of_load -= more.by_motion
-    by_motion = np.empty((pieces, dim, dim, dim + 1))
-    by_motion[..., :dim] = of_load.transpose(0, 2, 3, 1)
-    by_motion[..., dim] = np.einsum("pk,pkcj->pcj", w, slope)
-    rows = np.empty((pieces, density.shape[2], *by_motion.shape[1:]))
-    leak = np.einsum("pk,pk->p", w, n)
-    kernels.surface_rows(moments, density, of_cell, n, at.fields, by_motion, leak, rows)
+    rows = np.empty((len(n), at.p.shape[1], dim, dim, dim + 1))
+    density = density.reshape(*density.shape[:2], rows.shape[1], dim + 1)
+    force, leak, of_values = f[:, :dim], f[:, dim], np.ascontiguousarray(-by_motion[..., : dim + 1])
+    kernels.surface_rows(moments, density, of_cell, n, at.fields, of_values, -leak, rows)
     if at.mobility is not None:
-        rows[..., dim] += layer_by_motion(at, dp, slope)
+        rows[..., dim] += np.einsum("pak,pcjk->pacj", at.pressure_slope, by_motion[..., dim + 1 :])
 
-    force = -at.mass_of_pieces[..., None, None] * dload[:, None, None]
-    force -= area[:, :, None, None, None] * np.swapaxes(of_load, 1, 2)[:, None]
-    some, of_phi, of_vertices = _ends_at_walls(at, rule, grid, local, state.moved)
-    rows[some, ..., :dim] += of_phi[..., None] * load[some][:, None, None, None]
-    rows[some, ..., dim] += of_phi * leak[some][:, None, None, None]
-    force[some] += of_vertices[:, :, :, None] * load[some][:, None, None, :, None]
-    return CutDerivatives(operator, rows, force)
+    loads = at.mass_of_pieces[..., None, None] * of_force[:, None, None]
+    loads += area[:, :, None, None, None] * np.swapaxes(by_motion[..., :dim], 2, 3)[:, None]
+    some, of_phi, of_vertices = _ends_at_walls(at, rule, grid, index, origin, state.moved)
+    rows[some, ..., :dim] -= of_phi[..., None] * force[some][:, None, None, None]
+    rows[some, ..., dim] -= of_phi * leak[some][:, None, None, None]
+    loads[some] -= of_vertices[:, :, :, None] * force[some][:, None, None, :, None]
+    return CutDerivatives(operator, rows, loads)
 
 
 def _ends_at_walls(
-    at: InterfaceTerms, rule: Weights, grid: DistributedGrid, local: NDArray[np.int32], moved: float
+    at: InterfaceTerms, rule: Weights, grid: DistributedGrid, index: NDArray[np.int64], origin: Array, moved: float
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Pieces that end at the boundary of the box, and integrals of phi_a N_c e / s and N_b N_c e / s over these lines.
 
@@ -126,12 +114,10 @@ def _ends_at_walls(
     moved: motion [m] that is to be expected. A facet whose extent normal to the boundary is not much larger may cross
     the boundary or leave it as a whole, and does not count.
     """
-    index = np.stack(np.unravel_index(grid.numbers[local], grid.grid.shape, order="F"), axis=1)
     sides = np.stack([index == 0, index == np.array(grid.grid.shape) - 1], axis=2)
     sides &= (np.ptp(at.x, axis=1) > EXTENT_THAT_HOLDS * moved)[:, :, None]
     some = np.flatnonzero(sides.any(axis=(1, 2)))
-    origin = np.stack([edge[i] for edge, i in zip(grid.grid.edges, index[some].T, strict=True)], axis=1)
-    x, sizes = at.x[some], at.sizes[some]
+    origin, x, sizes = origin[some], at.x[some], at.sizes[some]
     lines = crossing_moments(x, at.n[some], origin, sizes, rule.reference, sides[some])
     of_phi = np.einsum("pcqj,qa->pacj", lines, rule.velocity_table[0])
     on_facet = barycentric(origin[:, None] + rule.reference * sizes[:, None], x)
@@ -147,62 +133,30 @@ def _means(at: InterfaceTerms, flow: Array) -> tuple[Array, Array]:
     return means[..., 0], means[..., 1:]
 
 
-def _penalty_changes(at: InterfaceTerms, g: Array, slope: Array, state: FlowTerms, reduced: Array) -> PenaltyChanges:
-    """Derivatives of s and s_n of `nitsche.penalties` by the motion of vertices.
+def _changes(at: InterfaceTerms, g: Array, inertia: Array, state: FlowTerms) -> tuple[Array, Array]:
+    """Relative derivatives of areas, (pieces, c, j), and those of normals and parameters of `surface_integrands`,
 
-    g: mean velocity of each facet where there is convection; slope: of `normal_derivative`.
+    (pieces, k, c, j), by the motion of vertices. g: mean velocity of each facet where there is convection.
     """
-    n, dim, factors = at.n, at.dim, state.penalties
-    turn = slope - n[:, :, None, None] * np.einsum("pk,pkcj->pcj", n, slope)[:, None]
+    n, dim, factors, slope = at.n, at.dim, state.penalties, normal_derivative(at.x, at.n)
+    stretch = np.einsum("pk,pkcj->pcj", n, slope)
+    turn = slope - n[:, :, None, None] * stretch[:, None]
     h = 1.0 / np.linalg.norm(n / at.sizes, axis=1)[:, None, None]
     dh = -(h**3) * np.einsum("pk,pkcj->pcj", n / at.sizes**2, turn)
     inflow = state.density * (np.einsum("pk,pk->p", g, n) < 0.0)[:, None, None]
-    ds = -factors.nitsche * at.mu * TRACE[dim, 1] / (reduced[:, None, None] * h**2) * dh
+    reduced = state.gaps.lengths(at.cell)[:, None, None]
+    ds = -factors.nitsche * at.mu * TRACE[dim, 1] / (reduced * h**2) * dh
     ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
-    return PenaltyChanges(turn, ds, state.density * factors.mass * state.alpha * dh, dh / h)
+    ds_n = state.density * factors.mass * state.alpha * dh
+    # D = 1 / (1 / c + s) in each direction
+    d_n, d_t = (part[:, None, None] for part in along_normal(at.released, n))
+    parameters = ds, ds_n, inertia[:, None, None] * dh / h, -(d_n**2) * (ds + ds_n), -(d_t**2) * ds
+    return stretch, np.concatenate([turn, np.stack(parameters, axis=1)], axis=1)
 
 
-def _penalty_by_motion(at: InterfaceTerms, slope: Array, w: Array, changes: PenaltyChanges) -> Array:
-    """d(P ds) w / ds by the motion of vertices, (pieces, k, c, j), with the parts of P held; w: mean of u - g."""
-    n, dim, turn = at.n, at.dim, changes.turn
-    stretch = np.einsum("pk,pkcj->pcj", n, slope)
-    total = np.einsum("pk,pkl,pl->p", n, at.penalty, n)
-    along = total - (np.einsum("pkk->p", at.penalty) - total) / (dim - 1)
-    w_n, w_turn = (w * n).sum(axis=1)[:, None, None, None], np.einsum("pl,plcj->pcj", w, turn)[:, None]
-    of_n = n[:, :, None, None]
-    found = (w[:, None] @ at.penalty)[:, 0, :, None, None] * stretch[:, None] + w[..., None, None] * changes.s[:, None]
-    return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * changes.normal[:, None] * w_n
-
-
-def _density(cells: NDArray, u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: FlowTerms) -> Array:
-    """`forms.bulk` + `forms.residual_based` + `forms.in_gaps` at points for each test function, (cells, q, a, i).
-
-    cells: local; u, p: their dofs, (cells, a, k) and (cells, a); sizes: lengths of their edges [m].
-    """
-    (phi, slopes), rho, dim = rule.velocity_table, state.density, sizes.shape[1]
-    gradient = slopes / sizes[:, None, None]
-    velocity, rate, a = (phi @ values[u] for values in (state.flow, state.rate, state.scale))
-    du = np.swapaxes(state.flow[u], 1, 2)[:, None] @ gradient
-    pressure, dp = state.flow[p] @ phi.T, (state.flow[p][:, None, None] @ gradient)[:, :, 0]
-    inertia = rho * (state.alpha * velocity - rate)
-    if state.convection:
-        inertia += rho * (du @ velocity[..., None])[..., 0]
-    metric = 4.0 / sizes[:, None] ** 2
-    convective = rho**2 * (metric * a**2).sum(axis=2, keepdims=True)
-    common = convective + 4.0 * rho**2 * state.scale_alpha**2
-    taus = 1.0 / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
-    strong = taus * (inertia + dp)
-    divergence = np.einsum("Cqkk->Cq", du)
-    viscous = 36.0 * mu**2 * (metric**2).sum(axis=2)
-    against = np.sqrt(convective[..., 0] + viscous) / metric.sum(axis=2) * divergence - pressure
-    value = np.concatenate([inertia, divergence[..., None]], axis=2)
-    by_slope = np.empty((*velocity.shape, dim + 1))
-    by_slope[..., :dim] = mu * (du + np.swapaxes(du, 2, 3)) + against[..., None, None] * np.eye(dim)
-    by_slope[..., :dim] += rho * a[..., None] * strong[:, :, None]
-    by_slope[..., dim] = strong
-    if state.gaps.marked is not None:
-        share, tangents = state.gaps.share_and_tangents(cells)
-        against = (inertia + dp) @ tangents
-        through = taus * against + state.gaps.flow(cells, inertia + dp, a)
-        by_slope[..., dim] -= (share[:, None, None] * through) @ tangents
-    return phi[:, :, None] * value[:, :, None] + gradient @ by_slope
+def _density(cells: Indices32, state: FlowTerms) -> Array:
+    """Integrand over the fluid at points of local cells for each test function, (cells, q, a, i)."""
+    found, gaps = state.moving[0].on(cells), state.gaps.marked
+    if gaps is not None:
+        found[gaps[cells]] += state.moving[1].on(cells[gaps[cells]])
+    return found
