@@ -15,7 +15,7 @@ from fsci.plot.frames import Moment
 from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
-from fsci.plot.render_flow import is_flow, load_meshes, load_state
+from fsci.plot.render_flow import is_flat, is_flow, load_meshes, load_state
 from fsci.plot.scene import compose, draw
 from fsci.plot.storyboard import choose, plot_story
 from fsci.running.files import make_folder, require_own
@@ -78,7 +78,7 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
             for moment in nearest
             for name in names
         ]
-    drawn = []
+    drawn, flat = [], bool(moments) and is_flat(import_pyvista().read(moments[-1][0][1]))
     if moments:
         failed = [] if field else plot_failed(out, folder, names, labels, mirror)
         shown = [name for name in names if not (failed and at_rest(moments[-1], name))]
@@ -88,7 +88,7 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
         if movie:
             drawn += plot_movie(folder, moments, names[0], labels.title, labels.units)
     if (out / "history.csv").exists():
-        drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units)
+        drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units, flat=flat)
     if (out / "summary.json").exists():
         residuals = json.loads((out / "summary.json").read_text(encoding="utf-8"))["newton"]["residuals"]
         if residuals:

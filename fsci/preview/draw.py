@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, label, literal, save_figure
+from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, save_figure
 from fsci.plot.render import axes_of_view, frame, import_pyvista, photograph
 from fsci.plot.scene import draw_triad
+from fsci.plot.units import label, literal
 from fsci.preview.parts import DistantPair, NamedSurface, Preview
 from solvers.api import Array
 
