@@ -29,17 +29,13 @@ def tidy(figure: Any) -> None:
 
 
 def _shrink(text: Any, figure: Any, renderer: Any) -> None:
-    """Scale a text by the room that there is on the side where it has the least of it."""
-    box = text.get_window_extent(renderer)
-    for low, high, size in ((box.x0, box.x1, figure.bbox.width), (box.y0, box.y1, figure.bbox.height)):
-        first, last = MARGIN * size, (1.0 - MARGIN) * size
-        middle = 0.5 * (low + high)
-        anchored = {"left": low, "right": high}.get(text.get_horizontalalignment(), middle) if low == box.x0 else middle
-        parts = [(anchored - first) / (anchored - low) if low < first and low < anchored else 1.0,
-                 (last - anchored) / (high - anchored) if high > last and high > anchored else 1.0]  # fmt: skip
-        if 0.0 < min(parts) < 1.0:
-            text.set_fontsize(text.get_fontsize() * min(parts))
-            return
+    """Scale a text by the room that it has along its line, on the side where there is less of it."""
+    box, upright = text.get_window_extent(renderer), text.get_rotation() in (90.0, 270.0)
+    low, high, size = (box.y0, box.y1, figure.bbox.height) if upright else (box.x0, box.x1, figure.bbox.width)
+    anchor = {"left": low, "right": high}.get(text.get_horizontalalignment(), 0.5 * (low + high))
+    room, wanted = (anchor - MARGIN * size, (1.0 - MARGIN) * size - anchor), (anchor - low, high - anchor)
+    parts = [has / needs for has, needs in zip(room, wanted, strict=True) if 0.0 < has < needs]
+    text.set_fontsize(text.get_fontsize() * min(parts, default=1.0))
 
 
 def _thin(axis: Any, figure: Any, renderer: Any) -> None:

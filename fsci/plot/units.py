@@ -37,7 +37,7 @@ SIZES = {**LENGTHS, **MASSES, **UNITS_OF_TIME}  #: in m, kg and s
 LADDERS: dict[Powers, tuple[tuple[str, float], ...]] = {
     (1, 0, 0): (("nm", 1e-9), ("µm", 1e-6), ("mm", 1e-3), ("m", 1.0), ("km", 1e3)),
     (1, 0, -1): (("µm/s", 1e-6), ("mm/s", 1e-3), ("m/s", 1.0)),
-    STRESS: (("µPa", 1e-6), ("mPa", 1e-3), ("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9)),
+    STRESS: (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9)),
     FORCE: (("nN", 1e-9), ("µN", 1e-6), ("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6)),
     (0, 1, -2): (("µN/m", 1e-6), ("mN/m", 1e-3), ("N/m", 1.0), ("N/mm", 1e3), ("kN/mm", 1e6)),
     ENERGY: (("nJ", 1e-9), ("µJ", 1e-6), ("mJ", 1e-3), ("J", 1.0), ("kJ", 1e3), ("MJ", 1e6)),
@@ -59,7 +59,7 @@ class Unit:
 
 
 def unit_of(quantity: str, units: Mapping[str, str], largest: float = 0.0, *, flat: bool = False) -> Unit:
-    """The unit in which the largest size of the values is 1 or more, of those that people use.
+    """The unit in which the largest size of the values is 1 or more, of lengths 0.1 or more, of those that people use.
 
     units: of length, mass and time; flat: in 2D, where forces and volumes are per depth. The unit of the case where the
     largest value is zero or not finite, or the case has units of its own.
@@ -72,7 +72,8 @@ def unit_of(quantity: str, units: Mapping[str, str], largest: float = 0.0, *, fl
         ladder = tuple((f"{name}/m", size) for name, size in LADDERS[whole])
     if ladder and 0.0 < largest < float("inf") and all(name in SIZES for name in names):
         size = SIZES[names[0]] ** (whole[0] - depth) * SIZES[names[1]] ** whole[1] * SIZES[names[2]] ** whole[2]
-        fitting = [step for step in ladder if step[1] <= largest * size * (1.0 + 1e-9)]
+        least = 1.0 if whole[1] else 0.1  # 0.4 m and 0.2 m/s are read more easily than 400 mm and 200 mm/s
+        fitting = [step for step in ladder if least * step[1] <= largest * size * (1.0 + 1e-9)]
         text, scale = fitting[-1] if fitting else ladder[0]
         unit = Unit(text, size / scale)
     else:
