@@ -18,6 +18,7 @@ from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
 from fsci.plot.render_flow import is_flat, is_flow, load_meshes, load_state
 from fsci.plot.scene import compose, draw
 from fsci.plot.storyboard import choose, plot_story
+from fsci.plot.units import unit_of
 from fsci.running.files import make_folder, require_own
 from fsci.running.history import read_history
 from fsci.running.output import Series, read_collection
@@ -99,7 +100,8 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
 def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: bool) -> list[Path]:
     """Further pictures of a run: mesh, flow over time, the state before contact, and contact pressure."""
     drawn = [plot_mesh(folder / "mesh.png", moments[0], labels)]
-    touching = [index for index, moment in enumerate(moments) if has_contact(moment[flow:])]
+    peaks = [largest_pressure(moment[flow:]) for moment in moments]
+    touching = [index for index, peak in enumerate(peaks) if peak > 0]
     if flow and len(moments[0]) > 1 and len(moments) > 2:  # start and end of a steady flow are no story
         shown = [moments[index] for index in choose(len(moments), touching[:1])]
         drawn.append(plot_story(folder / "story_velocity.png", shown, labels.title, labels.units))
@@ -108,7 +110,12 @@ def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: 
             drawn.append(plot_state(folder / "before_contact_velocity.png", before, "velocity", labels))
     if touching:
         name = "final" if touching[-1] == len(moments) - 1 else "last"
-        drawn.append(plot_pressure(folder / f"{name}_contact_pressure.png", moments[touching[-1]], labels))
+        peak = int(np.argmax(peaks))
+        unit = unit_of(CONTACT_PRESSURE, labels.units, peaks[peak])
+        at = f"{moments[peak][0][0]:.4g} {labels.units['time']}"
+        title = f"{labels.title}, largest {peaks[peak] * unit.factor:.3g} {unit.text} at {at}"
+        named = replace(labels, title=title)
+        drawn.append(plot_pressure(folder / f"{name}_contact_pressure.png", moments[touching[-1]], named))
     return drawn
 
 
@@ -154,7 +161,7 @@ def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
 
 def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
     """Draw the contact pressure on the bodies that have one, viewed from the side on which it acts."""
-    loaded = [load_body(file, CONTACT_PRESSURE) for time, file in moment if has_contact(((time, file),))]
+    loaded = [load_body(file, CONTACT_PRESSURE) for time, file in moment if largest_pressure(((time, file),)) > 0]
     # between the nodes of second-order cells the interpolated pressure may be negative
     bodies = [replace(body, values=np.maximum(body.values, 0.0)) for body in loaded if body.values is not None]
     towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
@@ -174,10 +181,10 @@ def look_at(normal: Array) -> Array:
     return np.asarray(away / np.linalg.norm(away))
 
 
-def has_contact(moment: Moment) -> bool:
-    """Whether any body has contact pressure."""
+def largest_pressure(moment: Moment) -> float:
+    """The largest contact pressure of all bodies; zero without contact."""
     data = [import_pyvista().read(file).point_data for _, file in moment]
-    return any(CONTACT_PRESSURE in fields and fields[CONTACT_PRESSURE].max() > 0 for fields in data)
+    return max((float(fields[CONTACT_PRESSURE].max()) for fields in data if CONTACT_PRESSURE in fields), default=0.0)
 
 
 def read_labels(out: Path) -> Labels:

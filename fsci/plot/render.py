@@ -39,6 +39,7 @@ class DrawnBody:
     shaded: bool = True  #: in 3D with shading; else its colours are exactly those of the colour bar
     opacity: float = 1.0  #: of the surface
     rigid: bool = False  #: no field colours it
+    aside: bool = False  #: an obstacle, which may be much larger than what is shown
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,11 @@ def import_pyvista() -> Any:
     import pyvista
 
     return pyvista
+
+
+def is_obstacle(mesh: Any) -> bool:
+    """Whether a mesh is that of an obstacle: it has no fields."""
+    return not mesh.point_data.keys() and not mesh.cell_data.keys()
 
 
 def load_body(mesh: Any, field: str) -> DrawnBody:

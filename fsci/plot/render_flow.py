@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.plot.render import ISOMETRIC, Array, DrawnBody, field_values, import_pyvista, load_body
+from fsci.plot.render import ISOMETRIC, Array, DrawnBody, field_values, import_pyvista, is_obstacle, load_body
 
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
@@ -38,6 +38,8 @@ def load_state(files: Sequence[Path], field: str, *, lines: bool = True) -> list
     lines: with streamlines in the plane, which change neither colours nor size.
     """
     meshes = [import_pyvista().read(path) for path in files]
+    if not is_flat(meshes[0]) and "fluid_fraction" in meshes[0].cell_data:
+        meshes = [mesh for mesh in meshes if not is_obstacle(mesh)]  # they would hide the flow
     flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
     parts = [part for mesh in meshes if mesh is not flow for part in _load_body(mesh, field)]
     if flow is None:
@@ -104,9 +106,11 @@ def _on_back(faces: Any) -> NDArray[np.int64]:
 def _load_body(mesh: Any, field: str) -> list[DrawnBody]:
     """The surface of a rigid body, or an elastic body."""
     if set(np.unique(mesh.celltypes)) == {LINE}:
-        return [replace(fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:]), rigid=True)]
+        filled = fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:])
+        return [replace(filled, rigid=True, aside=is_obstacle(mesh))]
     if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not is_flat(mesh):
-        return [DrawnBody(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None, rigid=True)]
+        surface = mesh.extract_surface(algorithm="dataset_surface")
+        return [DrawnBody(surface, NO_LINES, NO_LINES, None, rigid=True, aside=is_obstacle(mesh))]
     return [load_body(mesh, field)]
 
 

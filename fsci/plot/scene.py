@@ -23,6 +23,7 @@ TALL = ((0.02, 0.04, 0.76, 0.87), (0.82, 0.16, 0.024, 0.66))
 TALL_SIZE = (6.2, 7.0)  #: inches
 TALL_FROM = 1.2  #: height over width from which a picture in space is upright
 LONG_FROM = 2.2  #: width over height from which the colour bar is below the picture, and the figure as low as it can be
+AROUND = 0.25  #: part of the extent of all bodies, beside which obstacles are shown
 LOPSIDED = 0.2  #: values on one side of zero, in parts of those on the other, below which zero is no middle
 
 
@@ -62,18 +63,25 @@ def compose(
     states = iter(states)
     first = next(states)
     field = None if all(body.rigid for body in first) else field
+    alone = all(body.aside for body in first)
     spans = np.max([np.ptp(body.surface.points, axis=0) for body in first], axis=0)
     flat = bool(spans[2] <= 1e-9 * spans.max())
     axes = axes_of_view(flat, away)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    beside = low.copy(), high.copy()
     lowest, least, most = np.inf, np.inf, -np.inf
     for body in chain(first, chain.from_iterable(states)):
         seen = np.asarray(body.surface.points, dtype=np.float64) @ axes
+        if body.aside and not alone:
+            beside = np.minimum(beside[0], seen.min(axis=0)), np.maximum(beside[1], seen.max(axis=0))
+            continue
         low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
         if body.values is not None:
             lowest = min(lowest, float(body.values.min()))
             least = min(least, float(np.percentile(body.values, crop)) if lowest < 0 else lowest)
             most = max(most, float(np.percentile(body.values, 100 - crop)))
+    room = AROUND * (high - low)[:2].max()
+    low, high = np.minimum(low, np.maximum(beside[0], low - room)), np.maximum(high, np.minimum(beside[1], high + room))
     if field is None:
         least, most = 0.0, 1.0
     if least > most:

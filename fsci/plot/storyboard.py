@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.curves import CURVE_DOTS, CURVE_STYLE, save_figure
-from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, render
+from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, is_obstacle, render
 from fsci.plot.render_flow import (
     NO_LINES,
     fill_lines,
@@ -117,8 +117,9 @@ def plane_state(files: Sequence[Path]) -> tuple[list[DrawnBody], Axes, str]:
     pyvista = import_pyvista()
     meshes = [pyvista.read(path) for path in files]
     if is_flat(meshes[0]):
-        flow, *bodies = load_state(files, "velocity")
+        flow, *bodies = (part for part in load_state(files, "velocity") if not part.aside)
         return [flow, *(replace(body, edges=NO_LINES) for body in bodies)], ("x", "y"), ""
+    meshes = [mesh for mesh in meshes if not is_obstacle(mesh)]
     normal, origin = slice_plane(meshes[0], meshes[1:])
     axis = "xyz".index(normal)
     digit = 1e-4 * float(np.ptp(meshes[0].bounds[2 * axis : 2 * axis + 2]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
-MARGIN = 0.01  #: of the figure, on either side of a title
+SIDE_MARGIN = 0.01  #: of the figure, on either side of a title
 FEWEST_TICKS = 1  #: intervals along an axis
 
 
@@ -33,7 +33,7 @@ def _shrink(text: Any, figure: Any, renderer: Any) -> None:
     box, upright = text.get_window_extent(renderer), text.get_rotation() in (90.0, 270.0)
     low, high, size = (box.y0, box.y1, figure.bbox.height) if upright else (box.x0, box.x1, figure.bbox.width)
     anchor = {"left": low, "right": high}.get(text.get_horizontalalignment(), 0.5 * (low + high))
-    room, wanted = (anchor - MARGIN * size, (1.0 - MARGIN) * size - anchor), (anchor - low, high - anchor)
+    room, wanted = (anchor - SIDE_MARGIN * size, (1.0 - SIDE_MARGIN) * size - anchor), (anchor - low, high - anchor)
     parts = [has / needs for has, needs in zip(room, wanted, strict=True) if 0.0 < has < needs]
     text.set_fontsize(text.get_fontsize() * min(parts, default=1.0))
 

@@ -10,13 +10,13 @@ from fsci.case.units import LENGTHS, MASSES, UNITS_OF_TIME
 
 Powers = tuple[int, int, int]  #: of length, mass and time
 
-FORCE, ENERGY, STRESS, POWER = (1, 1, -2), (2, 1, -2), (-1, 1, -2), (2, 1, -3)
+OF_FORCE, OF_ENERGY, OF_STRESS, OF_POWER = (1, 1, -2), (2, 1, -2), (-1, 1, -2), (2, 1, -3)
 #: powers of probes, of time and of fields
 POWERS: dict[str, Powers] = {
     **{quantity.name: quantity.powers for quantity in QUANTITIES.values()},
     "time": (0, 0, 1),
-    **dict.fromkeys(("von_mises", "stress", "principal_stress", "nominal_stress"), STRESS),
-    **dict.fromkeys(("contact_pressure", "contact_traction", "traction", "wall_shear_stress"), STRESS),
+    **dict.fromkeys(("von_mises", "stress", "principal_stress", "nominal_stress"), OF_STRESS),
+    **dict.fromkeys(("contact_pressure", "contact_traction", "traction", "wall_shear_stress"), OF_STRESS),
     **dict.fromkeys(("vorticity", "strain_rate"), (0, 0, -1)),
     "q_criterion": (0, 0, -2),
     "contact_gap": (1, 0, 0),
@@ -37,11 +37,11 @@ SIZES = {**LENGTHS, **MASSES, **UNITS_OF_TIME}  #: in m, kg and s
 LADDERS: dict[Powers, tuple[tuple[str, float], ...]] = {
     (1, 0, 0): (("nm", 1e-9), ("µm", 1e-6), ("mm", 1e-3), ("m", 1.0), ("km", 1e3)),
     (1, 0, -1): (("µm/s", 1e-6), ("mm/s", 1e-3), ("m/s", 1.0)),
-    STRESS: (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9)),
-    FORCE: (("nN", 1e-9), ("µN", 1e-6), ("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6)),
+    OF_STRESS: (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9)),
+    OF_FORCE: (("nN", 1e-9), ("µN", 1e-6), ("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6)),
     (0, 1, -2): (("µN/m", 1e-6), ("mN/m", 1e-3), ("N/m", 1.0), ("N/mm", 1e3), ("kN/mm", 1e6)),
-    ENERGY: (("nJ", 1e-9), ("µJ", 1e-6), ("mJ", 1e-3), ("J", 1.0), ("kJ", 1e3), ("MJ", 1e6)),
-    POWER: (("nW", 1e-9), ("µW", 1e-6), ("mW", 1e-3), ("W", 1.0), ("kW", 1e3), ("MW", 1e6)),
+    OF_ENERGY: (("nJ", 1e-9), ("µJ", 1e-6), ("mJ", 1e-3), ("J", 1.0), ("kJ", 1e3), ("MJ", 1e6)),
+    OF_POWER: (("nW", 1e-9), ("µW", 1e-6), ("mW", 1e-3), ("W", 1.0), ("kW", 1e3), ("MW", 1e6)),
 }
 
 
@@ -68,7 +68,7 @@ def unit_of(quantity: str, units: Mapping[str, str], largest: float = 0.0, *, fl
     depth = int(flat and quantity in QUANTITIES and quantity not in INTENSIVE)
     names = (units["length"], units["mass"], units["time"])
     ladder = LADDERS.get((whole[0] - depth, whole[1], whole[2]))
-    if depth and whole in (ENERGY, POWER):
+    if depth and whole in (OF_ENERGY, OF_POWER):
         ladder = tuple((f"{name}/m", size) for name, size in LADDERS[whole])
     if ladder and 0.0 < largest < float("inf") and all(name in SIZES for name in names):
         size = SIZES[names[0]] ** (whole[0] - depth) * SIZES[names[1]] ** whole[1] * SIZES[names[2]] ** whole[2]
@@ -87,7 +87,7 @@ def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
 
 
 def _of_case(whole: Powers, depth: int, names: tuple[str, str, str]) -> str:
-    derived = dict(zip((FORCE, ENERGY, STRESS, POWER), DERIVED.get(names, ()), strict=False))
+    derived = dict(zip((OF_FORCE, OF_ENERGY, OF_STRESS, OF_POWER), DERIVED.get(names, ()), strict=False))
     length, mass, time = (literal(name) for name in names)
     if whole in derived:
         return f"{derived[whole]}/{length}" if depth else derived[whole]
