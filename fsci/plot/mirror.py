@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from fsci.plot.derived import TENSOR
 from fsci.plot.render import import_pyvista, is_obstacle
 from fsci.running.output import Series
 
 AXES = "xyz"
-TENSOR = ("xx", "yy", "zz", "xy", "yz", "xz")  #: order of the components of symmetric tensors in VTK
 BEYOND_PLANE = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsci.plot.along import plot_line, plot_surface
 from fsci.plot.curves import CURVE_DOTS, plot_convergence, plot_history, save_figure
 from fsci.plot.frames import Moment
 from fsci.plot.mirror import Mirror, read_plane
@@ -47,20 +48,53 @@ def plot_run(
     field: str | None = None,
     times: Sequence[float] = (),
     mirrors: Sequence[str] = (),
+    lines: Sequence[str] = (),
+    surfaces: Sequence[str] = (),
 ) -> list[Path]:
     """Draws the states, the probes and the convergence of the run in folder `out` into out/pictures.
 
     `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
     displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. With `times` only the
     states nearest to them are drawn. `mirrors` are planes of symmetry such as y=0, of which one side was computed: both
-    are drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
+    are drawn. With `lines`, such as 0,0.2:2.5,0.2, or `surfaces` of bodies only fields along them are written as tables
+    and drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
     """
     require_own(out)
     planes = [read_plane(text) for text in mirrors]
     with tempfile.TemporaryDirectory() as folder:
-        drawn = _plot(Path(out), movie, field, times, Mirror(planes, Path(folder)))
+        mirror = Mirror(planes, Path(folder))
+        if lines or surfaces:
+            drawn = _along(Path(out), field, times, mirror, lines, surfaces)
+        else:
+            drawn = _plot(Path(out), movie, field, times, mirror)
     list_pictures(Path(out) / "pictures", drawn)
     return drawn
+
+
+def _along(
+    out: Path, field: str | None, times: Sequence[float], mirror: Mirror, lines: Sequence[str], surfaces: Sequence[str]
+) -> list[Path]:
+    """Tables and curves along lines and surfaces of bodies, at all output times or those nearest to `times`."""
+    units, folder = read_labels(out).units, out / "pictures"
+    moments = chosen_moments(out, mirror, times)
+    flow = is_flow(moments[-1][0][1])
+    names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
+    of_body = (field,) if field else ("traction", "wall_shear_stress") if flow else STRUCTURE_FIELDS
+    make_folder(folder)
+    drawn = []
+    for number, text in enumerate(lines, 1):
+        drawn += plot_line(folder, number, moments, text, names, units)
+    for body in surfaces:
+        drawn += plot_surface(folder, body, moments, of_body, units)
+    return drawn
+
+
+def chosen_moments(out: Path, mirror: Mirror, times: Sequence[float]) -> list[Moment]:
+    """The output times, or of them those nearest to the given times. Raises ValueError without any."""
+    moments: list[Moment] = list(zip(*read_series(out / "fields", mirror), strict=False))
+    if not moments:
+        raise ValueError(f"there are no fields in '{out}'")
+    return [min(moments, key=lambda moment: abs(moment[0][0] - time)) for time in times] or moments
 
 
 def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mirror: Mirror) -> list[Path]:
@@ -71,12 +105,9 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
     flow = bool(moments) and is_flow(moments[-1][0][1])
     names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
     if times:
-        if not moments:
-            raise ValueError(f"there are no fields in '{out}'")
-        nearest = [min(moments, key=lambda moment: abs(moment[0][0] - time)) for time in times]
         return [
             plot_state(folder / f"{name}_{moment[0][0]:.6g}.png", moment, name, labels)
-            for moment in nearest
+            for moment in chosen_moments(out, mirror, times)
             for name in names
         ]
     drawn, flat = [], bool(moments) and is_flat(import_pyvista().read(moments[-1][0][1]))

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.plot.derived import component_of, with_derived
+
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]  #: shape (height, width, 3)
 
@@ -81,23 +83,12 @@ def load_body(mesh: Any, field: str) -> DrawnBody:
     from vtkmodules.vtkFiltersGeometry import vtkUnstructuredGridGeometryFilter
 
     outer = vtkUnstructuredGridGeometryFilter()
-    outer.SetInputData(pyvista.read(mesh) if isinstance(mesh, Path) else mesh)
+    outer.SetInputData(with_derived(pyvista.read(mesh) if isinstance(mesh, Path) else mesh, field))
     outer.Update()
     faces = pyvista.wrap(outer.GetOutput())
     surface = faces.extract_surface(nonlinear_subdivision=SUBDIVISION, algorithm="dataset_surface")
     edges, shared = face_edges(faces)
-    return DrawnBody(surface, edges, edges[~shared], field_values(surface.point_data, field))
-
-
-def field_values(data: Any, field: str) -> Array | None:
-    """The scalar that `field` names, shape (points,), or None if the body has no such field."""
-    name, _, component = field.rpartition(".")
-    if name in data and component in ("x", "y", "z"):
-        return np.asarray(data[name], dtype=np.float64)[:, "xyz".index(component)]
-    if field not in data:
-        return None
-    values = np.asarray(data[field], dtype=np.float64)
-    return values if values.ndim == 1 else np.linalg.norm(values, axis=1)
+    return DrawnBody(surface, edges, edges[~shared], component_of(surface.point_data, field))
 
 
 def face_edges(faces: Any) -> tuple[Array, NDArray[np.bool_]]:

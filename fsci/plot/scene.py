@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.curves import CURVE_SIZE, CURVE_STYLE
+from fsci.plot.derived import names_of_derived
 from fsci.plot.render import ISOMETRIC, Array, DrawnBody, Pixels, View, axes_of_view, frame, render
 from fsci.plot.tidy import tidy
 from fsci.plot.units import Unit, literal, unit_of
@@ -85,7 +86,9 @@ def compose(
     if field is None:
         least, most = 0.0, 1.0
     if least > most:
-        known = sorted({name for body in first for name in body.surface.point_data if not name.startswith("vtk")})
+        data = [body.surface.point_data for body in first]
+        known = sorted({name for part in data for name in part if not name.startswith("vtk")})
+        known += sorted({name for part in data for name in names_of_derived(part)})
         raise ValueError(f"no body has a field '{field}'; there are {', '.join(known)}")
     signed = least < 0 < most and min(-least, most) > LOPSIDED * max(-least, most)
     if signed:
@@ -233,7 +236,7 @@ def field_label(field: str, bodies: list[DrawnBody], unit: Unit) -> str:
     for body in bodies:
         data = body.surface.point_data
         if field in data:
-            return unit.beside(f"|{field}|" if data[field].ndim > 1 else field)
+            return unit.beside(f"|{field}|" if data[field].ndim > 1 and field != "principal_stress" else field)
     return unit.beside(field.replace(".", " "))
 
 

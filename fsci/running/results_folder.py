@@ -62,7 +62,7 @@ def _pictures(folder: Path) -> list[Path]:
     """The pictures in the list of a folder; it may have been written by somebody else."""
     listed = folder / PICTURE_LIST
     names = listed.read_text(encoding="utf-8", errors="replace").splitlines() if listed.is_file() else []
-    return [folder / name for name in names if re.fullmatch(r"[^/\0]+\.(png|gif|mp4)", name)]
+    return [folder / name for name in names if re.fullmatch(r"[^/\0]+\.(png|gif|mp4|csv)", name)]
 
 
 def _refused(out: Path, message: str) -> CaseError:
