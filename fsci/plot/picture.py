@@ -24,6 +24,7 @@ from fsci.running.files import make_folder, require_own
 from fsci.running.history import read_history
 from fsci.running.output import Series, read_collection
 from fsci.running.results_folder import list_pictures
+from fsci.running.vtkhdf import VTKHDF_FILE, unpack
 
 STRUCTURE_FIELDS = ("displacement",)  #: default field of structures
 FLUID_FIELDS = ("velocity", "pressure")
@@ -169,7 +170,12 @@ def at_rest(moment: Moment, name: str) -> bool:
 
 def read_series(folder: Path, mirror: Mirror) -> list[Series]:
     """The files of all whole parts; those of a flow come first, so that bodies are drawn on top of it."""
-    found = [mirror.whole(series) for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
+    packed = folder / VTKHDF_FILE
+    if packed.is_file():
+        parts = unpack(packed, Path(tempfile.mkdtemp(dir=mirror.folder)))
+    else:
+        parts = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
+    found = [mirror.whole(series) for series in parts]
     return sorted(found, key=lambda series: not is_flow(series[-1][1]))
 
 
