@@ -109,7 +109,12 @@ def _parser() -> argparse.ArgumentParser:
     preview.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
     settings(preview, "replace a setting")
     preview.add_argument(
-        "-o", "--out", metavar="FILE", type=Path, default=Path("preview.png"), help="the picture (default: preview.png)"
+        "-o",
+        "--out",
+        metavar="FILE",
+        type=Path,
+        default=Path("preview.png"),
+        help="the picture (default: preview.png), or a page that turns: FILE.html",
     )
 
     resume = command(_resume, "continue a run from its last checkpoint")
