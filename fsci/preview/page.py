@@ -15,7 +15,7 @@ from fsci.preview.parts import NamedSurface, Preview
 from fsci.running.files import write_text
 from solvers.api import Array
 
-DIGITS = 6  #: of coordinates
+PAGE_DIGITS = 6  #: of coordinates
 PATCH_OPACITY = 0.08  #: of faces of the box
 
 PAGE = """<!DOCTYPE html>
@@ -166,7 +166,7 @@ def _part(
 ) -> dict[str, Any]:
     from matplotlib.colors import to_hex
 
-    rounded = [[float(f"{c:.{DIGITS}g}") for c in x] for x in _in_space(points).tolist()]
+    rounded = [[float(f"{c:.{PAGE_DIGITS}g}") for c in x] for x in _in_space(points).tolist()]
     drawn = {"points": rounded, "lines": lines, "faces": faces or [], "opacity": opacity, "width": width}
     return {"name": name, "colour": to_hex(colour), **drawn, "words": words}
 
