@@ -35,13 +35,13 @@ DERIVED = {
 SIZES = {**LENGTHS, **MASSES, **UNITS_OF_TIME}  #: in m, kg and s
 #: powers -> names of units with their size in m, kg and s, in increasing order
 LADDERS: dict[Powers, tuple[tuple[str, float], ...]] = {
-    (1, 0, 0): (("nm", 1e-9), ("µm", 1e-6), ("mm", 1e-3), ("m", 1.0), ("km", 1e3)),
-    (1, 0, -1): (("µm/s", 1e-6), ("mm/s", 1e-3), ("m/s", 1.0)),
+    (1, 0, 0): (("nm", 1e-9), ("\u00b5m", 1e-6), ("mm", 1e-3), ("m", 1.0), ("km", 1e3)),
+    (1, 0, -1): (("\u00b5m/s", 1e-6), ("mm/s", 1e-3), ("m/s", 1.0)),
     OF_STRESS: (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("GPa", 1e9)),
-    OF_FORCE: (("nN", 1e-9), ("µN", 1e-6), ("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6)),
-    (0, 1, -2): (("µN/m", 1e-6), ("mN/m", 1e-3), ("N/m", 1.0), ("N/mm", 1e3), ("kN/mm", 1e6)),
-    OF_ENERGY: (("nJ", 1e-9), ("µJ", 1e-6), ("mJ", 1e-3), ("J", 1.0), ("kJ", 1e3), ("MJ", 1e6)),
-    OF_POWER: (("nW", 1e-9), ("µW", 1e-6), ("mW", 1e-3), ("W", 1.0), ("kW", 1e3), ("MW", 1e6)),
+    OF_FORCE: (("nN", 1e-9), ("\u00b5N", 1e-6), ("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6)),
+    (0, 1, -2): (("\u00b5N/m", 1e-6), ("mN/m", 1e-3), ("N/m", 1.0), ("N/mm", 1e3), ("kN/mm", 1e6)),
+    OF_ENERGY: (("nJ", 1e-9), ("\u00b5J", 1e-6), ("mJ", 1e-3), ("J", 1.0), ("kJ", 1e3), ("MJ", 1e6)),
+    OF_POWER: (("nW", 1e-9), ("\u00b5W", 1e-6), ("mW", 1e-3), ("W", 1.0), ("kW", 1e3), ("MW", 1e6)),
 }
 
 

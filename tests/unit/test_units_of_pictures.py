@@ -32,7 +32,7 @@ TONNES = {"length": "mm", "mass": "t", "time": "s"}
         ("force", TONNES, True, 2.5, 2.5, "N/mm"),
         ("reaction", TONNES, False, 2500.0, 2.5, "kN"),
         ("energy", SI_UNITS, True, 0.02, 20.0, "mJ/m"),
-        ("energy", TONNES, False, 0.02, 20.0, "µJ"),
+        ("energy", TONNES, False, 0.02, 20.0, "\u00b5J"),
         ("moment", SI_UNITS, False, 2000.0, 2.0, "kN m"),
         ("power", SI_UNITS, True, 5.0, 5.0, "W/m"),
         ("contact_area", SI_UNITS, True, 0.003, 3.0, "mm"),
