@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -108,7 +109,12 @@ def _parser() -> argparse.ArgumentParser:
     preview.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
     settings(preview, "replace a setting")
     preview.add_argument(
-        "-o", "--out", metavar="FILE", type=Path, default=Path("preview.png"), help="the picture (default: preview.png)"
+        "-o",
+        "--out",
+        metavar="FILE",
+        type=Path,
+        default=Path("preview.png"),
+        help="the picture (default: preview.png), or a page that turns: FILE.html",
     )
 
     resume = command(_resume, "continue a run from its last checkpoint")
@@ -140,6 +146,15 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="draw both sides of a plane of symmetry, of which one was computed: --mirror y=0; may be repeated",
     )
+
+    plot._negative_number_matcher = re.compile(r"-[\d.]")  # coordinates may be negative: --line -1,0:1,0
+    for name, metavar, words in (
+        ("line", "FROM:TO", "only fields along a line, as a table and curves: --line 0,0.2:2.5,0.2"),
+        ("surface", "BODY", "only fields along the surface of a body, as a table and, in 2D, curves"),
+    ):
+        plot.add_argument(
+            f"--{name}", dest=f"{name}s", metavar=metavar, action="append", default=[], help=f"{words}; may be repeated"
+        )
 
     report = command(_report, "write one page of a run: pictures, curves, balances, verification, time")
     results(report)
@@ -345,7 +360,13 @@ def _plot(options: argparse.Namespace) -> int:
     return _printed(
         "plot",
         lambda: plot_run(
-            options.out, movie=options.movie, field=options.field, times=options.times, mirrors=options.mirrors
+            options.out,
+            movie=options.movie,
+            field=options.field,
+            times=options.times,
+            mirrors=options.mirrors,
+            lines=options.lines,
+            surfaces=options.surfaces,
         ),
     )
 

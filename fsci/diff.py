@@ -10,8 +10,8 @@ from typing import Any
 
 from fsci.case import Case, load_case
 from fsci.case.settings import differences, dotted, in_words, settings_of
-from fsci.plot.curves import label
 from fsci.plot.lines import plot_lines
+from fsci.plot.units import label
 from fsci.running.history import History
 from fsci.running.kept_case import copies
 from fsci.running.results import read_results

@@ -22,7 +22,7 @@ from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid.flow import probes
 from solvers.fluid.flow.extreme_pressure import extreme_pressure
 from solvers.fluid.flow.field import Fluid
-from solvers.fluid.flow.section import flow_through
+from solvers.fluid.flow.section import plane_probe
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.surfaces.immersed import ImmersedBody, rigid_body
@@ -157,9 +157,9 @@ def _on_patch(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
 
 
 def _through_plane(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
-    plane = case.probes[name].plane
-    assert plane is not None
-    return flow_through(forces.fluid, plane.point, plane.normal)
+    settings = case.probes[name]
+    assert settings.plane is not None
+    return plane_probe(forces.fluid, settings.quantity, settings.plane.point, settings.plane.normal)
 
 
 def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
@@ -191,7 +191,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", "at"): _at,
     ("pressure", "on"): _on_patch,
     ("flow_rate", "through"): _on_patch,
-    ("flow_rate", "plane"): _through_plane,
+    **{(quantity, "plane"): _through_plane for quantity in ("flow_rate", "area", "pressure")},
     ("outlet_pressure", "through"): _of_outlet,
     ("pressure", ""): _extreme,
     ("force", ""): _force,

@@ -43,7 +43,7 @@ CHANGEABLE = (
     *(f"contact.pairs.*.{name}" for name in ("friction", "interference")),
     *(f"coupling.{name}" for name in ("relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")),
     "probes",
-    "output",
+    *(f"output.{name}" for name in ("fields_every", "checkpoint_every", "residuals")),
     "verify",
     "solver",
 )
@@ -51,6 +51,7 @@ CHANGEABLE = (
 #: Why others stay, by the last name of the setting.
 _REASONS_TO_STAY = {
     "start": "the run has begun at that time",
+    "format": "the outputs so far have it",
     **dict.fromkeys(
         ("initial_displacement", "initial_velocity", "initial_angular_velocity"),
         "it counts at the start only, which is over",

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.case.quantities import QUANTITIES
+from fsci.plot.tidy import tidy
+from fsci.plot.units import Unit, label, literal, unit_of
 from fsci.running.files import replacing
 from fsci.running.history import COLUMNS, History
 
@@ -32,16 +33,6 @@ CURVE_STYLE: Any = {
     "figure.constrained_layout.h_pad": 0.1,
     "figure.constrained_layout.w_pad": 0.1,
     "mathtext.default": "regular",
-}
-
-#: exponents of length, mass and time: those of probes, of time and of fields
-POWERS = {
-    **{quantity.name: quantity.powers for quantity in QUANTITIES.values()},
-    "time": (0, 0, 1),
-    "von_mises": (-1, 1, -2),
-    "contact_pressure": (-1, 1, -2),
-    **dict.fromkeys(("contact_traction", "traction", "wall_shear_stress"), (-1, 1, -2)),
-    "contact_gap": (1, 0, 0),
 }
 
 #: Balances in the history -> their titles; all vanish without errors of solvers and time steps.
@@ -68,51 +59,20 @@ NEGLIGIBLE, SMALL = (
     0.05,
 )  #: ranges of components in parts of the largest one that get no axis, an axis of their own
 
-#: (length, mass, time) -> the names of the units of force, energy, stress and power
-DERIVED = {
-    ("m", "kg", "s"): ("N", "J", "Pa", "W"),
-    ("mm", "t", "s"): ("N", "mJ", "MPa", "mW"),
-    ("mm", "g", "ms"): ("N", "mJ", "MPa", "W"),
-    ("mm", "kg", "ms"): ("kN", "J", "GPa", "kW"),
-}
-
-
-def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
-    """A text for matplotlib with the unit of a quantity in brackets, or without a unit for unknown quantities."""
-    text = literal(text.replace("von_mises", "von Mises stress").replace("_", " "))
-    powers = POWERS.get(quantity, (0, 0, 0))
-    if not any(powers):
-        return text
-    base = (literal(units["length"]), literal(units["mass"]), literal(units["time"]))
-    for named, derived in zip(((1, 1, -2), (2, 1, -2), (-1, 1, -2), (2, 1, -3)), DERIVED.get(base, ()), strict=False):
-        if powers == named:
-            return f"{text} [{derived}]"
-    factors = [(base[1], powers[1]), (base[0], powers[0]), (base[2], powers[2])]
-    above = " ".join(raised(name, power) for name, power in factors if power > 0)
-    below = " ".join(raised(name, -power) for name, power in factors if power < 0)
-    return f"{text} [{above or 1}/{below}]" if below else f"{text} [{above}]"
-
-
-def raised(name: str, power: int) -> str:
-    """A unit to a positive power."""
-    return name if power == 1 else f"{name}$^{power}$"
-
-
-def literal(text: str) -> str:
-    """A text that matplotlib draws as it stands: it reads what is between two dollar signs as a formula."""
-    return text.replace("$", r"\$")
-
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a figure as PNG; a file that is there is replaced."""
+    """Write a figure as PNG, with texts that fit; a file that is there is replaced."""
+    tidy(figure)
     with replacing(path) as unfinished:
         figure.savefig(unfinished, format="png")
 
 
-def plot_history(folder: Path, history: History, quantities: Mapping[str, str], units: Mapping[str, str]) -> list[Path]:
+def plot_history(
+    folder: Path, history: History, quantities: Mapping[str, str], units: Mapping[str, str], *, flat: bool = False
+) -> list[Path]:
     """Draws folder/history_<family>.png, one for all columns of a probe (A.x, A.y), and returns the files.
 
-    `quantities` maps probes to what they measure, `units` are those of length, mass and time.
+    `quantities` maps probes to what they measure, `units` are those of length, mass and time; flat: in 2D.
     """
     if len(history.get("time", ())) < 2:  # no curve: no step was accepted, or the run is one steady state
         return []
@@ -130,11 +90,14 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
         if len(columns) == 1 and family not in quantities:
             text, quantity = OWN_COLUMNS.get(columns[0], (columns[0].replace(".", " "), quantity))
         curves = {name.rpartition(".")[2]: history[name] for name in columns}
-        drawn.append(plot_curves(folder / f"history_{family}.png", time, curves, below, label(text, quantity, units)))
+        unit, curves = scaled(curves, quantity, units, flat=flat)
+        drawn.append(plot_curves(folder / f"history_{family}.png", time, curves, below, unit.beside(text)))
     if any(name.startswith(CONTACT_PREFIX) for name in history):
-        drawn.append(plot_panels(folder / "history_contact.png", time, contact_panels(history, units), below))
+        drawn.append(
+            plot_panels(folder / "history_contact.png", time, contact_panels(history, units, flat=flat), below)
+        )
     balances = {
-        label(text, quantity, units): {"": np.abs(history[name])}
+        unit_of(quantity, units, flat=flat).beside(text): {"": np.abs(history[name])}
         for name, (text, quantity) in BALANCES.items()
         if name in history
     }
@@ -143,22 +106,33 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
     return drawn
 
 
-def contact_panels(history: History, units: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def scaled(
+    curves: Mapping[str, Any], quantity: str, units: Mapping[str, str], *, flat: bool
+) -> tuple[Unit, dict[str, Any]]:
+    """The unit of curves by the largest of their values, and the curves in it."""
+    sizes = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in curves.values()]
+    unit = unit_of(quantity, units, float(max(sizes)), flat=flat)
+    return unit, {name: values * unit.factor for name, values in curves.items()}
+
+
+def contact_panels(history: History, units: Mapping[str, str], *, flat: bool = False) -> dict[str, dict[str, Any]]:
     """Label -> curves: the force of each pair of surfaces, then other numbers of theirs, then counts of nodes."""
-    panels: dict[str, dict[str, Any]] = {}
+    panels: dict[tuple[str, str], dict[str, Any]] = {}
     for name, values in history.items():
         pair, _, number = name.removeprefix(CONTACT_PREFIX).rpartition(".")
         if not name.startswith(CONTACT_PREFIX):
             continue
         if number in ("x", "y", "z"):
-            panels.setdefault(label(f"contact force of {pair}", "force", units), {})[number] = values
+            panels.setdefault((f"contact force of {pair}", "force"), {})[number] = values
         elif pair:
-            panels[label(f"contact {number} of {pair}", f"contact_{number}", units)] = {"": values}
+            panels[f"contact {number} of {pair}", f"contact_{number}"] = {"": values}
         else:
-            panels.setdefault(NODES, {})[number] = values
-    if NODES in panels:
-        panels[NODES] = panels.pop(NODES)
-    return panels
+            panels.setdefault((NODES, ""), {})[number] = values
+    found = {}
+    for (text, quantity), curves in sorted(panels.items(), key=lambda panel: panel[0][0] == NODES):
+        unit, curves = scaled(curves, quantity, units, flat=flat)
+        found[unit.beside(text)] = curves
+    return found
 
 
 def plot_panels(

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_SIZE, CURVE_STYLE, PANEL, literal, save_figure
+from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_SIZE, CURVE_STYLE, PANEL, save_figure
+from fsci.plot.units import literal
 
 MARKED = 30  #: points of a line that are marked
 DASHES = ("-", "--", ":", "-.")  #: of lines that share a colour

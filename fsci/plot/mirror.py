@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.render import import_pyvista
+from fsci.plot.derived import TENSOR
+from fsci.plot.render import import_pyvista, is_obstacle
 from fsci.running.output import Series
 
 AXES = "xyz"
@@ -41,14 +42,18 @@ class Mirror:
     folder: Path
 
     def whole(self, series: Series) -> Series:
-        """The VTU files of a part with their reflections; raises ValueError if a part is on both sides of a plane."""
+        """The VTU files of a part with their reflections; raises ValueError if a part is on both sides of a plane.
+
+        An obstacle may be: it is whole as it is.
+        """
         if not self.planes:
             return series
         folder = Path(tempfile.mkdtemp(dir=self.folder))
         for _, file in series:
             mesh = import_pyvista().read(file)
             for plane in self.planes:
-                mesh = with_reflection(mesh, plane)
+                if not (is_obstacle(mesh) and crosses(mesh, plane)):
+                    mesh = with_reflection(mesh, plane)
             mesh.save(folder / file.name)
         return [(time, folder / file.name) for time, file in series]
 
@@ -66,10 +71,16 @@ def read_plane(text: str) -> Plane:
 
 def with_reflection(mesh: Any, plane: Plane) -> Any:
     """A mesh and its reflection as one mesh, joined at the nodes in the plane."""
-    low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
-    if min(high - plane.at, plane.at - low) > BEYOND_PLANE * mesh.length:
+    if crosses(mesh, plane):
+        low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
         raise ValueError(f"a part lies on both sides of {plane.name}, from {low:.6g} to {high:.6g}")
     return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=1e-9 * mesh.length)
+
+
+def crosses(mesh: Any, plane: Plane) -> bool:
+    """Whether a mesh is on both sides of a plane."""
+    low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
+    return bool(min(high - plane.at, plane.at - low) > BEYOND_PLANE * mesh.length)
 
 
 def reflection(mesh: Any, plane: Plane) -> Any:
@@ -89,6 +100,9 @@ def reflection(mesh: Any, plane: Plane) -> Any:
             values, component = data[name], name.rpartition("_")[2]
             if values.ndim == 2 and values.shape[1] == 3:
                 data[name] = np.where(np.arange(3) == plane.axis, -values, values)
+            elif values.ndim == 2 and values.shape[1] == 6:  # of a symmetric tensor
+                odd = [pair.count(AXES[plane.axis]) == 1 for pair in TENSOR]
+                data[name] = np.where(odd, -values, values)
             elif len(component) == 2 and set(component) <= set(AXES) and component.count(AXES[plane.axis]) == 1:
                 data[name] = -values
     return found

@@ -10,18 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
+from fsci.plot.along import plot_line, plot_surface
 from fsci.plot.curves import CURVE_DOTS, plot_convergence, plot_history, save_figure
 from fsci.plot.frames import Moment
 from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
-from fsci.plot.render_flow import is_flow, load_meshes, load_state
+from fsci.plot.render_flow import is_flat, is_flow, load_meshes, load_state
 from fsci.plot.scene import compose, draw
 from fsci.plot.storyboard import choose, plot_story
+from fsci.plot.units import unit_of
 from fsci.running.files import make_folder, require_own
 from fsci.running.history import read_history
 from fsci.running.output import Series, read_collection
 from fsci.running.results_folder import list_pictures
+from fsci.running.vtkhdf import VTKHDF_FILE, unpack
 
 STRUCTURE_FIELDS = ("displacement",)  #: default field of structures
 FLUID_FIELDS = ("velocity", "pressure")
@@ -46,20 +49,53 @@ def plot_run(
     field: str | None = None,
     times: Sequence[float] = (),
     mirrors: Sequence[str] = (),
+    lines: Sequence[str] = (),
+    surfaces: Sequence[str] = (),
 ) -> list[Path]:
     """Draws the states, the probes and the convergence of the run in folder `out` into out/pictures.
 
     `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
     displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. With `times` only the
     states nearest to them are drawn. `mirrors` are planes of symmetry such as y=0, of which one side was computed: both
-    are drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
+    are drawn. With `lines`, such as 0,0.2:2.5,0.2, or `surfaces` of bodies only fields along them are written as tables
+    and drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
     """
     require_own(out)
     planes = [read_plane(text) for text in mirrors]
     with tempfile.TemporaryDirectory() as folder:
-        drawn = _plot(Path(out), movie, field, times, Mirror(planes, Path(folder)))
+        mirror = Mirror(planes, Path(folder))
+        if lines or surfaces:
+            drawn = _along(Path(out), field, times, mirror, lines, surfaces)
+        else:
+            drawn = _plot(Path(out), movie, field, times, mirror)
     list_pictures(Path(out) / "pictures", drawn)
     return drawn
+
+
+def _along(
+    out: Path, field: str | None, times: Sequence[float], mirror: Mirror, lines: Sequence[str], surfaces: Sequence[str]
+) -> list[Path]:
+    """Tables and curves along lines and surfaces of bodies, at all output times or those nearest to `times`."""
+    units, folder = read_labels(out).units, out / "pictures"
+    moments = chosen_moments(out, mirror, times)
+    flow = is_flow(moments[-1][0][1])
+    names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
+    of_body = (field,) if field else ("traction", "wall_shear_stress") if flow else STRUCTURE_FIELDS
+    make_folder(folder)
+    drawn = []
+    for number, text in enumerate(lines, 1):
+        drawn += plot_line(folder, number, moments, text, names, units)
+    for body in surfaces:
+        drawn += plot_surface(folder, body, moments, of_body, units)
+    return drawn
+
+
+def chosen_moments(out: Path, mirror: Mirror, times: Sequence[float]) -> list[Moment]:
+    """The output times, or of them those nearest to the given times. Raises ValueError without any."""
+    moments: list[Moment] = list(zip(*read_series(out / "fields", mirror), strict=False))
+    if not moments:
+        raise ValueError(f"there are no fields in '{out}'")
+    return [min(moments, key=lambda moment: abs(moment[0][0] - time)) for time in times] or moments
 
 
 def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mirror: Mirror) -> list[Path]:
@@ -70,15 +106,12 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
     flow = bool(moments) and is_flow(moments[-1][0][1])
     names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
     if times:
-        if not moments:
-            raise ValueError(f"there are no fields in '{out}'")
-        nearest = [min(moments, key=lambda moment: abs(moment[0][0] - time)) for time in times]
         return [
             plot_state(folder / f"{name}_{moment[0][0]:.6g}.png", moment, name, labels)
-            for moment in nearest
+            for moment in chosen_moments(out, mirror, times)
             for name in names
         ]
-    drawn = []
+    drawn, flat = [], bool(moments) and is_flat(import_pyvista().read(moments[-1][0][1]))
     if moments:
         failed = [] if field else plot_failed(out, folder, names, labels, mirror)
         shown = [name for name in names if not (failed and at_rest(moments[-1], name))]
@@ -88,7 +121,7 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
         if movie:
             drawn += plot_movie(folder, moments, names[0], labels.title, labels.units)
     if (out / "history.csv").exists():
-        drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units)
+        drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units, flat=flat)
     if (out / "summary.json").exists():
         residuals = json.loads((out / "summary.json").read_text(encoding="utf-8"))["newton"]["residuals"]
         if residuals:
@@ -99,7 +132,8 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mir
 def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: bool) -> list[Path]:
     """Further pictures of a run: mesh, flow over time, the state before contact, and contact pressure."""
     drawn = [plot_mesh(folder / "mesh.png", moments[0], labels)]
-    touching = [index for index, moment in enumerate(moments) if has_contact(moment[flow:])]
+    peaks = [largest_pressure(moment[flow:]) for moment in moments]
+    touching = [index for index, peak in enumerate(peaks) if peak > 0]
     if flow and len(moments[0]) > 1 and len(moments) > 2:  # start and end of a steady flow are no story
         shown = [moments[index] for index in choose(len(moments), touching[:1])]
         drawn.append(plot_story(folder / "story_velocity.png", shown, labels.title, labels.units))
@@ -108,7 +142,12 @@ def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: 
             drawn.append(plot_state(folder / "before_contact_velocity.png", before, "velocity", labels))
     if touching:
         name = "final" if touching[-1] == len(moments) - 1 else "last"
-        drawn.append(plot_pressure(folder / f"{name}_contact_pressure.png", moments[touching[-1]], labels))
+        peak = int(np.argmax(peaks))
+        unit = unit_of(CONTACT_PRESSURE, labels.units, peaks[peak])
+        at = f"{moments[peak][0][0]:.4g} {labels.units['time']}"
+        title = f"{labels.title}, largest {peaks[peak] * unit.factor:.3g} {unit.text} at {at}"
+        named = replace(labels, title=title)
+        drawn.append(plot_pressure(folder / f"{name}_contact_pressure.png", moments[touching[-1]], named))
     return drawn
 
 
@@ -131,7 +170,12 @@ def at_rest(moment: Moment, name: str) -> bool:
 
 def read_series(folder: Path, mirror: Mirror) -> list[Series]:
     """The files of all whole parts; those of a flow come first, so that bodies are drawn on top of it."""
-    found = [mirror.whole(series) for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
+    packed = folder / VTKHDF_FILE
+    if packed.is_file():
+        parts = unpack(packed, Path(tempfile.mkdtemp(dir=mirror.folder)))
+    else:
+        parts = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
+    found = [mirror.whole(series) for series in parts]
     return sorted(found, key=lambda series: not is_flow(series[-1][1]))
 
 
@@ -154,7 +198,7 @@ def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
 
 def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
     """Draw the contact pressure on the bodies that have one, viewed from the side on which it acts."""
-    loaded = [load_body(file, CONTACT_PRESSURE) for time, file in moment if has_contact(((time, file),))]
+    loaded = [load_body(file, CONTACT_PRESSURE) for time, file in moment if largest_pressure(((time, file),)) > 0]
     # between the nodes of second-order cells the interpolated pressure may be negative
     bodies = [replace(body, values=np.maximum(body.values, 0.0)) for body in loaded if body.values is not None]
     towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
@@ -174,10 +218,10 @@ def look_at(normal: Array) -> Array:
     return np.asarray(away / np.linalg.norm(away))
 
 
-def has_contact(moment: Moment) -> bool:
-    """Whether any body has contact pressure."""
+def largest_pressure(moment: Moment) -> float:
+    """The largest contact pressure of all bodies; zero without contact."""
     data = [import_pyvista().read(file).point_data for _, file in moment]
-    return any(CONTACT_PRESSURE in fields and fields[CONTACT_PRESSURE].max() > 0 for fields in data)
+    return max((float(fields[CONTACT_PRESSURE].max()) for fields in data if CONTACT_PRESSURE in fields), default=0.0)
 
 
 def read_labels(out: Path) -> Labels:

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.plot.derived import component_of, with_derived
+
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]  #: shape (height, width, 3)
 
@@ -39,6 +41,7 @@ class DrawnBody:
     shaded: bool = True  #: in 3D with shading; else its colours are exactly those of the colour bar
     opacity: float = 1.0  #: of the surface
     rigid: bool = False  #: no field colours it
+    aside: bool = False  #: an obstacle, which may be much larger than what is shown
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,11 @@ def import_pyvista() -> Any:
     return pyvista
 
 
+def is_obstacle(mesh: Any) -> bool:
+    """Whether a mesh is that of an obstacle: it has no fields."""
+    return not mesh.point_data.keys() and not mesh.cell_data.keys()
+
+
 def load_body(mesh: Any, field: str) -> DrawnBody:
     """An elastic body from its mesh or VTU file.
 
@@ -75,23 +83,12 @@ def load_body(mesh: Any, field: str) -> DrawnBody:
     from vtkmodules.vtkFiltersGeometry import vtkUnstructuredGridGeometryFilter
 
     outer = vtkUnstructuredGridGeometryFilter()
-    outer.SetInputData(pyvista.read(mesh) if isinstance(mesh, Path) else mesh)
+    outer.SetInputData(with_derived(pyvista.read(mesh) if isinstance(mesh, Path) else mesh, field))
     outer.Update()
     faces = pyvista.wrap(outer.GetOutput())
     surface = faces.extract_surface(nonlinear_subdivision=SUBDIVISION, algorithm="dataset_surface")
     edges, shared = face_edges(faces)
-    return DrawnBody(surface, edges, edges[~shared], field_values(surface.point_data, field))
-
-
-def field_values(data: Any, field: str) -> Array | None:
-    """The scalar that `field` names, shape (points,), or None if the body has no such field."""
-    name, _, component = field.rpartition(".")
-    if name in data and component in ("x", "y", "z"):
-        return np.asarray(data[name], dtype=np.float64)[:, "xyz".index(component)]
-    if field not in data:
-        return None
-    values = np.asarray(data[field], dtype=np.float64)
-    return values if values.ndim == 1 else np.linalg.norm(values, axis=1)
+    return DrawnBody(surface, edges, edges[~shared], component_of(surface.point_data, field))
 
 
 def face_edges(faces: Any) -> tuple[Array, NDArray[np.bool_]]:

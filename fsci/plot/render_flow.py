@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.plot.render import ISOMETRIC, Array, DrawnBody, field_values, import_pyvista, load_body
+from fsci.plot.derived import component_of, with_derived
+from fsci.plot.render import ISOMETRIC, Array, DrawnBody, import_pyvista, is_obstacle, load_body
 
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
@@ -38,11 +39,14 @@ def load_state(files: Sequence[Path], field: str, *, lines: bool = True) -> list
     lines: with streamlines in the plane, which change neither colours nor size.
     """
     meshes = [import_pyvista().read(path) for path in files]
+    if not is_flat(meshes[0]) and "fluid_fraction" in meshes[0].cell_data:
+        meshes = [mesh for mesh in meshes if not is_obstacle(mesh)]  # they would hide the flow
+    meshes[0] = with_derived(meshes[0], field)
     flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
     parts = [part for mesh in meshes if mesh is not flow for part in _load_body(mesh, field)]
     if flow is None:
         return parts
-    if field_values(flow.point_data, field) is not None:
+    if component_of(flow.point_data, field) is not None:
         parts = [replace(part, values=None) for part in parts]
     if is_flat(flow):
         return [plane_flow(flow, field, lines=lines), *parts]
@@ -104,9 +108,11 @@ def _on_back(faces: Any) -> NDArray[np.int64]:
 def _load_body(mesh: Any, field: str) -> list[DrawnBody]:
     """The surface of a rigid body, or an elastic body."""
     if set(np.unique(mesh.celltypes)) == {LINE}:
-        return [replace(fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:]), rigid=True)]
+        filled = fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:])
+        return [replace(filled, rigid=True, aside=is_obstacle(mesh))]
     if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not is_flat(mesh):
-        return [DrawnBody(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None, rigid=True)]
+        surface = mesh.extract_surface(algorithm="dataset_surface")
+        return [DrawnBody(surface, NO_LINES, NO_LINES, None, rigid=True, aside=is_obstacle(mesh))]
     return [load_body(mesh, field)]
 
 
@@ -120,7 +126,7 @@ def plane_flow(mesh: Any, field: str, *, lines: bool = True) -> DrawnBody:
     """A 2D flow, with streamlines if the field is its velocity."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     streamlines = _plane_streamlines(mesh) if lines and field.partition(".")[0] == STREAMLINES else NO_LINES
-    return DrawnBody(surface, streamlines, NO_LINES, field_values(surface.point_data, field), line_colour="white")
+    return DrawnBody(surface, streamlines, NO_LINES, component_of(surface.point_data, field), line_colour="white")
 
 
 def _plane_streamlines(mesh: Any) -> Array:
@@ -170,7 +176,7 @@ def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[DrawnBod
     normal, origin = slice_plane(mesh, bodies)
     middle = mesh.slice(normal=normal, origin=origin)
     if middle.n_points:
-        values = field_values(middle.point_data, field)
+        values = component_of(middle.point_data, field)
         parts.append(
             DrawnBody(middle, NO_LINES, NO_LINES, values, shaded=False, opacity=SLICE_WITH_TUBES if moving else SLICE)
         )
@@ -179,7 +185,7 @@ def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[DrawnBod
     if moving and np.any(mesh.point_data[STREAMLINES]):
         tubes = _tubes(mesh, bodies)
         if tubes.n_points:
-            parts.append(DrawnBody(tubes, NO_LINES, NO_LINES, field_values(tubes.point_data, field)))
+            parts.append(DrawnBody(tubes, NO_LINES, NO_LINES, component_of(tubes.point_data, field)))
     return parts
 
 
@@ -219,7 +225,7 @@ def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
         axes = np.linalg.svd(surface.points - centre, full_matrices=False)[2].T  # the last one is a torus's
         extent = np.ptp((surface.points - centre) @ axes, axis=0)
         around = _lattice(centre, axes, SEEDED_EXTENT * extent * [1, 1, 0], BODY_SEEDS)
-        seeds.append(around[~_inside(around, surface)])
+        seeds.append(around[~inside_surface(around, surface)])
     lines = mesh.streamlines_from_source(
         import_pyvista().PolyData(np.concatenate(seeds)),
         vectors=STREAMLINES,
@@ -231,7 +237,7 @@ def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
     return lines.tube(radius=TUBES * mesh.length, n_sides=SIDES) if lines.n_points else lines
 
 
-def _inside(points: Array, surface: Any) -> NDArray[np.bool_]:
+def inside_surface(points: Array, surface: Any) -> NDArray[np.bool_]:
     """Mask of the points inside of a closed surface."""
     from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints
 

@@ -9,8 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import CURVE_SIZE, CURVE_STYLE, label, literal
+from fsci.plot.curves import CURVE_SIZE, CURVE_STYLE
+from fsci.plot.derived import names_of_derived
 from fsci.plot.render import ISOMETRIC, Array, DrawnBody, Pixels, View, axes_of_view, frame, render
+from fsci.plot.tidy import tidy
+from fsci.plot.units import Unit, literal, unit_of
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
 
@@ -21,6 +24,7 @@ TALL = ((0.02, 0.04, 0.76, 0.87), (0.82, 0.16, 0.024, 0.66))
 TALL_SIZE = (6.2, 7.0)  #: inches
 TALL_FROM = 1.2  #: height over width from which a picture in space is upright
 LONG_FROM = 2.2  #: width over height from which the colour bar is below the picture, and the figure as low as it can be
+AROUND = 0.25  #: part of the extent of all bodies, beside which obstacles are shown
 LOPSIDED = 0.2  #: values on one side of zero, in parts of those on the other, below which zero is no middle
 
 
@@ -33,6 +37,7 @@ class Scene:
     limits: tuple[float, float]  #: values at the ends of the colour bar
     colours: str  #: name of the colour map
     title: str
+    unit: Unit  #: of the values
     label: str  #: label of the colour bar; empty without colours
     units: Mapping[str, str]  #: of length, mass and time
     extend: str  #: ends of the colour bar that values exceed: neither, max or both
@@ -59,22 +64,31 @@ def compose(
     states = iter(states)
     first = next(states)
     field = None if all(body.rigid for body in first) else field
+    alone = all(body.aside for body in first)
     spans = np.max([np.ptp(body.surface.points, axis=0) for body in first], axis=0)
     flat = bool(spans[2] <= 1e-9 * spans.max())
     axes = axes_of_view(flat, away)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    beside = low.copy(), high.copy()
     lowest, least, most = np.inf, np.inf, -np.inf
     for body in chain(first, chain.from_iterable(states)):
         seen = np.asarray(body.surface.points, dtype=np.float64) @ axes
+        if body.aside and not alone:
+            beside = np.minimum(beside[0], seen.min(axis=0)), np.maximum(beside[1], seen.max(axis=0))
+            continue
         low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
         if body.values is not None:
             lowest = min(lowest, float(body.values.min()))
             least = min(least, float(np.percentile(body.values, crop)) if lowest < 0 else lowest)
             most = max(most, float(np.percentile(body.values, 100 - crop)))
+    room = AROUND * (high - low)[:2].max()
+    low, high = np.minimum(low, np.maximum(beside[0], low - room)), np.maximum(high, np.minimum(beside[1], high + room))
     if field is None:
         least, most = 0.0, 1.0
     if least > most:
-        known = sorted({name for body in first for name in body.surface.point_data if not name.startswith("vtk")})
+        data = [body.surface.point_data for body in first]
+        known = sorted({name for part in data for name in part if not name.startswith("vtk")})
+        known += sorted({name for part in data for name in names_of_derived(part)})
         raise ValueError(f"no body has a field '{field}'; there are {', '.join(known)}")
     signed = least < 0 < most and min(-least, most) > LOPSIDED * max(-least, most)
     if signed:
@@ -96,7 +110,8 @@ def compose(
         limits=(least, most),
         colours=colours or ("coolwarm" if signed else "viridis"),
         title=title,
-        label=field_label(field, first, units) if field else "",
+        unit=(unit := field_unit(field or "", (least, most), units)),
+        label=field_label(field, first, unit) if field else "",
         units=units,
         extend="neither" if crop == 0 else "both" if lowest < least else "max",
         layout=layout,
@@ -122,7 +137,7 @@ def draw(scene: Scene, bodies: list[DrawnBody], time: float, *, dots: int) -> An
     figure, image, title = lay_out(scene, dots)
     image.set_data(render_into(scene, bodies, dots))
     title.set_text(literal(headline(scene, time)))
-    return figure
+    return figure  # `save_figure` makes the texts fit
 
 
 def animate(scene: Scene, states: Iterable[tuple[float, list[DrawnBody]]], *, dots: int) -> Iterator[Pixels]:
@@ -131,6 +146,8 @@ def animate(scene: Scene, states: Iterable[tuple[float, list[DrawnBody]]], *, do
 
     figure, image, title = lay_out(scene, dots)
     canvas = FigureCanvasAgg(figure)
+    title.set_text(literal(headline(scene, -1.2345e-5)))  # as long as the title can be
+    tidy(figure)
     moving = [image, *image.axes.spines.values(), title] if scene.flat else [image, title]
     for artist in moving:
         artist.set_animated(True)
@@ -152,22 +169,26 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
 
     view = scene.view
     x, y = float(view.centre @ view.right), float(view.centre @ view.up)
-    extent = (x - view.half_width, x + view.half_width, y - view.half_height, y + view.half_height)
+    ends = np.array([x - view.half_width, x + view.half_width, y - view.half_height, y + view.half_height])
+    length = unit_of("displacement", scene.units, float(np.abs(ends).max()))
     with matplotlib.rc_context({**CURVE_STYLE, "axes.grid": False}):
         figure = Figure(scene.size, dpi=dots)
         axes = figure.add_axes(scene.layout[0])
-        image = axes.imshow(np.full((1, 1, 3), 255), extent=extent, interpolation="none", aspect="auto")
+        image = axes.imshow(
+            np.full((1, 1, 3), 255), extent=tuple(length.factor * ends), interpolation="none", aspect="auto"
+        )
         if scene.flat:
             axes.spines[:].set_visible(True)
-            axes.set_xlabel(label("x", "displacement", scene.units))
-            axes.set_ylabel(label("y", "displacement", scene.units))
+            axes.set_xlabel(length.beside("x"))
+            axes.set_ylabel(length.beside("y"))
             axes.locator_params(nbins=6)
         else:
             axes.set_axis_off()
             draw_triad(figure, view)
         title = axes.set_title("", pad=10)
         if scene.label:
-            draw_colour_bar(figure, scene.layout[1], scene.limits, scene.colours, scene.label, extend=scene.extend)
+            limits = (scene.limits[0] * scene.unit.factor, scene.limits[1] * scene.unit.factor)
+            draw_colour_bar(figure, scene.layout[1], limits, scene.colours, scene.label, extend=scene.extend)
     return figure, image, title
 
 
@@ -205,14 +226,18 @@ def headline(scene: Scene, time: float) -> str:
     return f"{scene.title}, t = {time:.5g} {scene.units['time']}"
 
 
-def field_label(field: str, bodies: list[DrawnBody], units: Mapping[str, str]) -> str:
-    """Label of the colours: |displacement| [m], displacement x [m], stress_xx [Pa]."""
+def field_unit(field: str, limits: tuple[float, float], units: Mapping[str, str]) -> Unit:
+    """The unit of a field, or of its component, with values in these limits."""
+    return unit_of(field.partition(".")[0], units, max(abs(limits[0]), abs(limits[1])))
+
+
+def field_label(field: str, bodies: list[DrawnBody], unit: Unit) -> str:
+    """Label of the colours: |displacement| [m], displacement x [m], stress xx [kPa]."""
     for body in bodies:
         data = body.surface.point_data
         if field in data:
-            return label(f"|{field}|" if data[field].ndim > 1 else field, field, units)
-    name, _, component = field.rpartition(".")
-    return label(f"{name} {component}", name, units)
+            return unit.beside(f"|{field}|" if data[field].ndim > 1 and field != "principal_stress" else field)
+    return unit.beside(field.replace(".", " "))
 
 
 def draw_triad(figure: Any, view: View) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import CURVE_DOTS, CURVE_STYLE, label, literal, save_figure
-from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, render
+from fsci.plot.curves import CURVE_DOTS, CURVE_STYLE, save_figure
+from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, is_obstacle, render
 from fsci.plot.render_flow import (
     NO_LINES,
     fill_lines,
@@ -21,7 +21,8 @@ from fsci.plot.render_flow import (
     slice_plane,
     surrounds,
 )
-from fsci.plot.scene import draw_colour_bar, field_label
+from fsci.plot.scene import draw_colour_bar, field_label, field_unit
+from fsci.plot.units import literal, unit_of
 
 PANELS = 6  #: at most
 BOARD_WIDTH = 9.0  #: of the picture, inches
@@ -51,6 +52,8 @@ def plot_story(
     names, plane = states[0][1:]
     crop = BOARD_CROP[not plane]
     limits = (0.0, max(float(np.percentile(speed, 100 - crop)) for speed in speeds) or 1.0)
+    length = unit_of("displacement", units, float(np.abs([low, high]).max()))
+    unit = field_unit("velocity", limits, units)
     columns, rows = arrange(len(states), *(high - low))
     width = (BOARD_WIDTH - BESIDE - BAR - (columns - 1) * GAP) / columns
     height = width * float(np.divide(*(high - low)[::-1]))
@@ -62,7 +65,7 @@ def plot_story(
             left = BESIDE + column * (width + GAP)
             bottom = BELOW + (rows - 1 - row) * (height + HEAD + GAP)
             axes = figure.add_axes((left / BOARD_WIDTH, bottom / total, width / BOARD_WIDTH, height / total))
-            extent = (low[0], high[0], low[1], high[1])
+            extent = tuple(length.factor * np.array([low[0], high[0], low[1], high[1]]))
             axes.imshow(snapshot(bodies, low, high, limits, width), extent=extent, aspect="auto", interpolation="none")
             axes.spines[:].set_visible(True)
             axes.xaxis.set_major_locator(MaxNLocator(max(2, round(width / 0.7)), steps=[1, 2, 5, 10]))
@@ -70,14 +73,15 @@ def plot_story(
             axes.set_title(literal(f"t = {moment[0][0]:.3g} {units['time']}"), fontsize=CURVE_STYLE["font.size"], pad=5)
             axes.tick_params(labelleft=column == 0, labelbottom=index + columns >= len(states))
             if column == 0:
-                axes.set_ylabel(label(names[1], "displacement", units))
+                axes.set_ylabel(length.beside(names[1]))
             if index + columns >= len(states):
-                axes.set_xlabel(label(names[0], "displacement", units))
+                axes.set_xlabel(length.beside(names[0]))
         figure.suptitle(literal(f"{title}, {plane} {units['length']}" if plane else title), y=1 - 0.1 / total, va="top")
         tall = min(total - BELOW - TITLE - HEAD, 4.0)
         middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
         place = ((BOARD_WIDTH - BAR + 0.2) / BOARD_WIDTH, (middle - tall / 2) / total, 0.14 / BOARD_WIDTH, tall / total)
-        draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), extend="max")
+        shown_limits = (limits[0] * unit.factor, limits[1] * unit.factor)
+        draw_colour_bar(figure, place, shown_limits, "viridis", field_label("velocity", flows, unit), extend="max")
         save_figure(figure, path)
     return path
 
@@ -113,8 +117,9 @@ def plane_state(files: Sequence[Path]) -> tuple[list[DrawnBody], Axes, str]:
     pyvista = import_pyvista()
     meshes = [pyvista.read(path) for path in files]
     if is_flat(meshes[0]):
-        flow, *bodies = load_state(files, "velocity")
+        flow, *bodies = (part for part in load_state(files, "velocity") if not part.aside)
         return [flow, *(replace(body, edges=NO_LINES) for body in bodies)], ("x", "y"), ""
+    meshes = [mesh for mesh in meshes if not is_obstacle(mesh)]
     normal, origin = slice_plane(meshes[0], meshes[1:])
     axis = "xyz".index(normal)
     digit = 1e-4 * float(np.ptp(meshes[0].bounds[2 * axis : 2 * axis + 2]))

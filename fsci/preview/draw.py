@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, label, literal, save_figure
+from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, save_figure
 from fsci.plot.render import axes_of_view, frame, import_pyvista, photograph
 from fsci.plot.scene import draw_triad
+from fsci.plot.units import label, literal
 from fsci.preview.parts import DistantPair, NamedSurface, Preview
 from solvers.api import Array
 
@@ -157,19 +159,31 @@ def _filled(segments: Array) -> Any:
     """The path around a body: closed loops of segments that run with the body on their left."""
     from matplotlib.path import Path as Outline
 
-    starts = {tuple(start): number for number, start in enumerate(segments[:, 0])}
-    left, vertices, codes = set(range(len(segments))), [], []
-    while left:
-        number = next(iter(left))
-        codes.append(Outline.MOVETO)
-        vertices.append(segments[number, 0])
-        while number in left:
-            left.discard(number)
-            vertices.append(segments[number, 1])
-            codes.append(Outline.LINETO)
-            number = starts.get(tuple(segments[number, 1]), -1)
-        codes[-1] = Outline.CLOSEPOLY
+    points, numbers = np.unique(segments.reshape(-1, 2), axis=0, return_inverse=True)
+    vertices, codes = [], []
+    for loop in loops_of(numbers.reshape(-1, 2)):
+        vertices += [points[number] for number in loop]
+        codes += [Outline.MOVETO, *[Outline.LINETO] * (len(loop) - 2), Outline.CLOSEPOLY]
     return Outline(np.array(vertices), codes)
+
+
+def loops_of(segments: NDArray[np.int64]) -> list[list[int]]:
+    """Points of closed lines, the first one again at the end, from segments that follow one another, shape (n, 2)."""
+    following: dict[int, list[int]] = {}
+    for first, last in segments.tolist():
+        following.setdefault(first, []).append(last)
+    loops = []
+    while following:
+        point = next(iter(following))
+        loop = [point]
+        while point in following:
+            ends = following[point]
+            after = ends.pop()
+            if not ends:
+                del following[point]
+            loop.append(point := after)
+        loops.append(loop)
+    return loops
 
 
 # ----------------------------------------------------------------------------------------------------------- space

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ from numpy.typing import NDArray
 from fsci.case.errors import did_you_mean
 from fsci.running.files import refused, require_own
 from fsci.running.history import History, read_history
+from fsci.running.output import write_vtu
+from fsci.running.vtkhdf import VTKHDF_FILE, read_step, read_times
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,13 @@ class Results:
         import pyvista
 
         found = {}
+        if (packed := self.folder / "fields" / VTKHDF_FILE).is_file():
+            times = np.asarray(read_times(packed))
+            number = len(times) - 1 if time is None else int(np.argmin(np.abs(times - time)))
+            with tempfile.TemporaryDirectory() as folder:
+                for snapshot in read_step(packed, number):
+                    write_vtu(path := Path(folder) / f"{snapshot.name}.vtu", snapshot)
+                    found[snapshot.name] = pyvista.read(path)
         for collection in sorted((self.folder / "fields").glob("*.pvd")):
             reader: Any = pyvista.get_reader(collection)
             times = np.asarray(reader.time_values)

@@ -11,6 +11,7 @@ from fsci.running.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, refused
 from fsci.running.kept_case import copies, keep_case
 from fsci.running.lock import Lock
 from fsci.running.output import FORMATS, is_output_of
+from fsci.running.vtkhdf import VTKHDF_FILE
 
 MARKER_TEXT = "The results of a run of fsci. Another run into this folder replaces the files that runs write.\n"
 
@@ -62,7 +63,7 @@ def _pictures(folder: Path) -> list[Path]:
     """The pictures in the list of a folder; it may have been written by somebody else."""
     listed = folder / PICTURE_LIST
     names = listed.read_text(encoding="utf-8", errors="replace").splitlines() if listed.is_file() else []
-    return [folder / name for name in names if re.fullmatch(r"[^/\0]+\.(png|gif|mp4)", name)]
+    return [folder / name for name in names if re.fullmatch(r"[^/\0]+\.(png|gif|mp4|csv)", name)]
 
 
 def _refused(out: Path, message: str) -> CaseError:
@@ -103,7 +104,7 @@ def _remove_results(out: Path) -> None:
 def _results(out: Path) -> list[Path]:
     """Files that runs write into the folders of `out`."""
     found = [*_checkpoints(out / "checkpoint"), *_checkpoints(out / "failure")]
-    found += [*_fields(out / "fields"), *_fields(out / "failure" / "fields")]
+    found += [*_fields(out / "fields"), *_fields(out / "failure" / "fields"), out / "fields" / VTKHDF_FILE]
     found += [out / "failure" / name for name in ("case.yaml", "failure.json")]
     found += [*_pictures(out / "pictures"), out / "pictures" / PICTURE_LIST]
     return found

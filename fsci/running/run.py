@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,8 +34,9 @@ from fsci.running.steps import clock_of, initialise, take_step
 from fsci.running.stop import StopWatch
 from fsci.running.summary import RunRecord, memory_mb, shares, summarize, write_summary
 from fsci.running.verify import evaluate
+from fsci.running.vtkhdf import VtkHdfWriter
 from fsci.running.watch import Watched
-from solvers.api import Finding, State, StepFailed, StepInfo
+from solvers.api import Finding, Snapshot, State, StepFailed, StepInfo
 
 if TYPE_CHECKING:
     from fsci.builder.build import Simulation
@@ -106,7 +107,8 @@ class Run:
     ended_by: Finding | None = field(init=False, default=None)  #: what ends it after the step it was found in
     described: str = field(init=False)  #: settings and meshes as text, for checkpoints
     history: HistoryWriter = field(init=False)  #: on rank 0
-    fields: FieldWriter = field(init=False)  #: on rank 0
+    fields: FieldWriter | VtkHdfWriter = field(init=False)  #: on rank 0
+    obstacles: Callable[[float], list[Snapshot]] = field(init=False)  #: at a time, on rank 0
 
     def __post_init__(self) -> None:
         self.root = self.comm.rank == 0
@@ -124,7 +126,7 @@ class Run:
             self._initialise(simulation)
             if self.root:
                 self.history = HistoryWriter(self.out / "history.csv")
-                self.fields = FieldWriter(self.out / "fields")
+                self._start_fields(self._writer(self.out / "fields"))
             self._write_fields()
             return self._watched_loop()
 
@@ -158,7 +160,7 @@ class Run:
                 keep_case(self.case, self.out)
                 (self.out / "STOP").unlink(missing_ok=True)
                 self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
-                self.fields = FieldWriter.resume(self.out / "fields", self.clock.time)
+                self._start_fields(self._writer.resume(self.out / "fields", self.clock.time))
             return self._watched_loop()
 
     @contextmanager
@@ -299,11 +301,21 @@ class Run:
 
     # ------------------------------------------------------------------------------------------------- files
 
+    @property
+    def _writer(self) -> type[FieldWriter] | type[VtkHdfWriter]:
+        return VtkHdfWriter if self.case.output.format == "vtkhdf" else FieldWriter
+
+    def _start_fields(self, writer: FieldWriter | VtkHdfWriter) -> None:
+        from fsci.builder.obstacles import obstacle_snapshots
+
+        self.fields, self.obstacles = writer, obstacle_snapshots(self.case)
+
     def _write_fields(self) -> None:
         with self.record.timer("output"):
             snapshots = self.simulation.snapshots()
             if self.root:
-                self.fields.write(self.clock.step, self.clock.time, snapshots)
+                parts = [*snapshots, *self.obstacles(self.clock.time)]
+                self.fields.write(self.clock.step, self.clock.time, parts)
 
     def _write_checkpoint(self) -> None:
         """Write the state of the last accepted step."""

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from fsci.case import Case
-from fsci.plot.curves import label, literal
 from fsci.plot.lines import Line, plot_lines
+from fsci.plot.units import label, literal
 from fsci.sweep.points import Combination, Parameter, short_names
 
 SPREAD = 30.0  #: ratio of positive parameters from which their axis is logarithmic

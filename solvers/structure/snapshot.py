@@ -16,6 +16,10 @@ from solvers.structure.field import Structure
 PartFields = Mapping[str, Mapping[str, tuple[NDArray[np.int64], Array]]]
 
 
+#: Components xx, yy, zz, xy, yz, xz of a tensor given by rows, as VTK has them.
+SYMMETRIC = [0, 4, 8, 1, 5, 2]
+
+
 def snapshots(
     structure: Structure, on_surfaces: PartFields | None = None, vectors: Mapping[str, Array] | None = None
 ) -> list[Snapshot]:
@@ -27,14 +31,15 @@ def snapshots(
     nodal = {"displacement": structure.now.u, "velocity": structure.now.v, **(vectors or {})}
     for number, body in enumerate(structure.bodies):
         gathered = {name: _gather(body, structure.split(values)[number]) for name, values in nodal.items()}
-        von_mises = gather_nodal(structure.comm, Nodal(_von_mises(body.stress())[:, None], body.nodes[: body.owned]))
+        stress = gather_nodal(structure.comm, Nodal(body.stress(), body.nodes[: body.owned]))
         known = {name: values for name, values in gathered.items() if values is not None}
-        if von_mises is None:
+        if stress is None:
             continue
         mesh = body.domain.source
         assert mesh is not None
         displacement, velocity, *_ = known.values()
-        fields = {"displacement": displacement, "velocity": velocity, "von_mises": von_mises[:, 0], **known}
+        fields = {"displacement": displacement, "velocity": velocity, "von_mises": _von_mises(stress), **known}
+        fields["stress"] = stress[:, SYMMETRIC]
         for name, (nodes, values) in (on_surfaces or {}).get(body.name, {}).items():
             fields[name] = np.zeros((len(mesh.points), *values.shape[1:]))
             fields[name][nodes] = np.nan_to_num(values)

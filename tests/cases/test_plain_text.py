@@ -7,7 +7,8 @@ import pytest
 from small_cases import PLATE
 
 from fsci.cli import execute
-from fsci.plot.curves import COLOURS, label, literal, plot_curves
+from fsci.plot.curves import COLOURS, plot_curves
+from fsci.plot.units import label, literal
 
 TITLES = [r"bad $\frac{$ x", "cost $5 and $6", r"$x$ \$ \\ _a^b {", "<b>&amp;</b> \"'$", "a $ alone", "$$", "no dollar"]
 

@@ -1,12 +1,16 @@
 """`fsci preview`: what is drawn, distances of pairs, pictures in the plane and in space, refused cases."""
 
+import shutil
+import subprocess
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from PIL import Image
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.preview.draw import closest, entries
+from fsci.preview.draw import closest, entries, loops_of
 from fsci.preview.parts import nearest, preview_of
 from solvers.mesh.distance import distances_in_pairs
 
@@ -131,3 +135,60 @@ def test_one_line_for_two_bodies(tmp_path):
     more = "blocks: {slave: {body: high, on: bottom}, master: {body: low, on: top}}"
     text = SPACE.replace(more, f"far: {{slave: {{body: high, on: top}}, master: {{body: low, on: top}}}}, {more}")
     assert [pair.name for pair in closest(preview_of(written(tmp_path, text)).pairs)] == ["blocks"]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    if found is None:
+        pytest.skip("no Chromium is installed")
+
+    def show(page, *options):
+        command = [found, "--headless", "--no-sandbox", "--disable-gpu", "--window-size=1000,600", *options]
+        return subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=60).stdout
+
+    return show
+
+
+def area_of(picture, colour):
+    """Part of the pixels that have about this colour, shaded or not."""
+    pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(float)
+    size = np.linalg.norm(pixels, axis=1)
+    same = pixels @ colour / (np.maximum(size, 1.0) * np.linalg.norm(colour))
+    return float(np.mean((same > 0.997) & (size > 0.3 * np.linalg.norm(colour))))
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    (PLANE, ["pair stop: block.outer, still, 0.2 m apart", "loose (free)", "probe here", "patch inlet (velocity)"]),
+    (SPACE, ["pair blocks: high.bottom, low.top, 0.02 m apart", "pressure on high.front", "low (elastic)"]),
+])  # fmt: skip
+def test_a_page_that_turns(tmp_path, browser, text, words):
+    """Chromium shows bodies in their colours, and the words on pairs and parts; nothing is loaded from elsewhere."""
+    (tmp_path / "case.yaml").write_text(text.replace("title: All kinds", "title: A <b>bold</b> scene"))
+    page = tmp_path / "page.html"
+    assert fsci("preview", tmp_path, "-o", page).returncode == 0
+    assert "http" not in page.read_text()
+    shown = browser(page, "--dump-dom")
+    assert all(f"</i>{text}</label>" in shown for text in words)
+    assert ("<h1>A &lt;b&gt;bold&lt;/b&gt; scene</h1>" in shown) == (text is PLANE)
+    browser(page, f"--screenshot={tmp_path / 'page.png'}")
+    picture = Image.open(tmp_path / "page.png")
+    blue, orange, red = (np.array(x, dtype=float) for x in ((0, 114, 178), (213, 94, 0), (204, 0, 0)))
+    if text is SPACE:
+        assert area_of(picture, blue) > 0.05
+        assert area_of(picture, orange) > 0.01
+        assert area_of(picture, red) > 0.0
+    else:
+        canvas = picture.crop((0, 0, 620, 600))
+        assert area_of(canvas, red) > 40 * 2 / (620 * 600), "the line of the pair, a tenth of the box long"
+        black = np.asarray(canvas.convert("L")) < 40
+        assert black.mean(axis=1).max() > 0.6, "a wall along the box"
+
+
+def test_loops_of_a_body_with_a_hole_and_of_bodies_that_share_a_corner():
+    ring = np.array([[0, 1], [1, 2], [2, 0], [5, 4], [4, 3], [3, 5]])
+    assert loops_of(ring) == [[0, 1, 2, 0], [5, 4, 3, 5]]
+    touching = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [3, 4], [4, 2]])
+    used = [pair for loop in loops_of(touching) for pair in pairwise(loop)]
+    assert sorted(used) == sorted(map(tuple, touching.tolist()))
+    assert all(loop[0] == loop[-1] for loop in loops_of(touching))

@@ -5,7 +5,7 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, solve_steady, wall
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from solvers.fluid.flow.section import flow_through
+from solvers.fluid.flow.section import plane_probe
 from solvers.fluid.grid.box import Grid, uniform
 from solvers.fluid.grid.nested import RefinedBox, refined
 from solvers.fluid.terms.boundary.patches import Patch
@@ -82,7 +82,7 @@ def test_plane_through_a_turned_block(element, point, normal):
                        element=element, scheme="steady")  # fmt: skip
     put(fluid, linear_field(3))
     exact = [rate_of(section_of(corners, point, normal), normal, 3) for corners in (corners_of_box(3), points)]
-    assert flow_through(fluid, point, normal)()[""] == pytest.approx(exact[0] - exact[1], abs=1e-12)
+    assert plane_probe(fluid, "flow_rate", point, normal)()[""] == pytest.approx(exact[0] - exact[1], abs=1e-12)
 
 
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
@@ -93,7 +93,7 @@ def test_line_through_a_polygon(element, point, normal):
                        element=element, scheme="steady")  # fmt: skip
     put(fluid, linear_field(2))
     hull = [rate_of(section_of(corners, point, normal), normal, 2) for corners in (corners_of_box(2), points)]
-    assert flow_through(fluid, point, normal)()[""] == pytest.approx(hull[0] - hull[1], abs=1e-12)
+    assert plane_probe(fluid, "flow_rate", point, normal)()[""] == pytest.approx(hull[0] - hull[1], abs=1e-12)
 
 
 def test_bodies_that_overlap_count_once():
@@ -107,7 +107,7 @@ def test_bodies_that_overlap_count_once():
     put(fluid, linear_field(3))
     point, normal = (0.47, 0.5, 0.5), (1, 0.4, 0.3)
     whole, a, b, both = (rate_of(section_of(c, point, normal), normal, 3) for c in (corners_of_box(3), *corners))
-    assert flow_through(fluid, point, normal)()[""] == pytest.approx(whole - a - b + both, abs=1e-12)
+    assert plane_probe(fluid, "flow_rate", point, normal)()[""] == pytest.approx(whole - a - b + both, abs=1e-12)
 
 
 def test_nested_cells():
@@ -118,7 +118,7 @@ def test_nested_cells():
     put(fluid, linear_field(2))
     for point, normal in (((0.5, 0.5), (0, 1)), ((0.45, 0.5), (1, 0.6))):
         whole, hole = (rate_of(section_of(c, point, normal), normal, 2) for c in (corners_of_box(2), points))
-        assert flow_through(fluid, point, normal)()[""] == pytest.approx(whole - hole, abs=1e-12)
+        assert plane_probe(fluid, "flow_rate", point, normal)()[""] == pytest.approx(whole - hole, abs=1e-12)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-3])
@@ -143,7 +143,7 @@ def test_poiseuille_between_bodies(shift, scale, solved):
     else:
         put(fluid, profile)
     for point, normal in (((1.5, 0.5), (1, 0)), ((1.37, 0.5), (2, 0)), ((1.4, 0.45), (1, 0.5)), ((1.4, 0.45), (-1, 1))):
-        rate = flow_through(fluid, np.array(point) * scale, normal)()[""]
+        rate = plane_probe(fluid, "flow_rate", np.array(point) * scale, normal)()[""]
         assert abs(rate - np.sign(normal[0]) * exact) < 1e-10 * exact
 
 
@@ -161,7 +161,7 @@ def test_both_sides_of_a_plate_in_one_cell_count_once(dim):
     for normal in ((0.2, 1, 0.1), (1, 0.8, -0.3), (1, 0.1, 0)):
         point, n = (0.45, 0.51, 0.48)[:dim], normal[:dim]
         whole = rate_of(section_of(box, point, n), n, dim)
-        found = flow_through(fluid, point, n)()[""]
+        found = plane_probe(fluid, "flow_rate", point, n)()[""]
         hole = plate_in_box(points, point, n, dim)
         assert found == pytest.approx(whole - hole, abs=1e-11), normal
 
@@ -181,4 +181,28 @@ def test_plane_without_bodies(dim):
     put(fluid, linear_field(dim))
     point, normal = (0.45, 0.51, 0.48)[:dim], (1, 0.8, -0.3)[:dim]
     whole = rate_of(section_of(corners_of_box(dim), point, normal), normal, dim)
-    assert flow_through(fluid, point, normal)()[""] == pytest.approx(whole, abs=1e-12)
+    assert plane_probe(fluid, "flow_rate", point, normal)()[""] == pytest.approx(whole, abs=1e-12)
+
+
+@pytest.mark.parametrize(("dim", "normal"), [(2, (1, 0.3)), (2, (0, 1)), (3, (1, 0.3, -0.6)), (3, (0, 0, 1))])
+def test_open_area_and_mean_pressure(dim, normal):
+    """A linear pressure: its mean is the value at the centre of what is open, box less block."""
+    points, facets = block([-0.2, -0.25, -0.3][:dim], [0.2, 0.25, 0.3][:dim])
+    points = points @ turned((0.4, 0.7 if dim == 3 else 0.0))[:dim, :dim].T + [0.52, 0.48, 0.5][:dim]
+    fluid = make_fluid(uniform([0] * dim, [1] * dim, [4] * dim), [wall(linear_field(dim))],
+                       [body("block", points, facets)], element="q2q1", scheme="steady")  # fmt: skip
+    nodes = fluid.unknowns.pressure
+    fluid.flow[nodes.dofs[:, 0]] = 2.0 + nodes.points @ LINEAR[0, :dim]
+    point = (0.5, 0.5, 0.5)[:dim]
+    (box, at), (hole, inside) = (section_of(c, point, normal) for c in (corners_of_box(dim), points))
+    mean = 2.0 + (box * at - hole * inside) @ LINEAR[0, :dim] / (box - hole)
+    assert plane_probe(fluid, "area", point, normal)()[""] == pytest.approx(box - hole, abs=1e-13)
+    assert plane_probe(fluid, "pressure", point, normal)()[""] == pytest.approx(mean, abs=1e-12)
+
+
+def test_a_plane_that_a_body_covers():
+    fluid = make_fluid(uniform([0, 0], [1, 1], [4, 4]), [wall(linear_field(2))],
+                       [body("block", *block([0.3, -1], [0.6, 2]))], element="q1q1", scheme="steady")  # fmt: skip
+    values = {name: plane_probe(fluid, name, (0.45, 0.5), (1, 0))()[""] for name in ("area", "flow_rate", "pressure")}
+    assert values["area"] == values["flow_rate"] == 0.0
+    assert np.isnan(values["pressure"])

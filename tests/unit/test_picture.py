@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from fsci.plot import movie
-from fsci.plot.curves import contact_panels, label, plot_history
+from fsci.plot.curves import contact_panels, plot_history
 from fsci.plot.picture import plot_run
 from fsci.plot.render import axes_of_view, frame, load_body, render
 from fsci.plot.scene import compose
+from fsci.plot.units import label
 from fsci.running.history import HistoryWriter
 from fsci.running.output import FieldWriter, write_text, write_vtu
 from fsci.running.summary import write_summary

@@ -6,7 +6,7 @@ import pytest
 
 from fsci.case.probes import Probe
 from fsci.case.quantities import FIELDS, LOCATIONS, QUANTITIES
-from fsci.plot.curves import label
+from fsci.plot.units import label
 from fsci.schema import reference_markdown
 
 WHERE = {"at": [0.5, 0.5], "on": "left", "pair": "touch", "through": "outlet"}

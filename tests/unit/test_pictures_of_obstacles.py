@@ -1,0 +1,90 @@
+"""Obstacles are written where they are and drawn beside the bodies; pictures say what the largest pressure was."""
+
+import numpy as np
+import pytest
+from case_mistakes import load
+
+from fsci.builder.obstacles import obstacle_snapshots
+from fsci.plot.picture import largest_pressure, plot_run
+from fsci.plot.render_flow import load_state
+from fsci.plot.scene import AROUND, compose
+from fsci.running.output import FieldWriter, write_vtu
+from solvers.api import Snapshot
+
+UNITS_OF_CASE = {"length": "m", "mass": "kg", "time": "s"}
+SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+OBSTACLES = """\
+time: {step: 0.5, end: 1}
+structure:
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}
+      material: {law: neo_hooke, E: 1, nu: 0, density: 1}
+      supports: [{on: bottom, displacement: [0, 0]}]
+contact:
+  obstacles:
+    punch: {mesh: {shape: rectangle, size: [2, 1], cells: [2, 1], origin: [0, 1]}, on: bottom, motion: ["t", "-0.1*t"]}
+    floor: {mesh: {shape: rectangle, size: [9, 1], cells: [1, 1], origin: [0, -1]}, on: top}
+    block: {mesh: {shape: rectangle, size: [9, 1], cells: [1, 1], origin: [0, -1]}, on: top}
+  pairs:
+    punch: {slave: {body: block, on: top}, master: {obstacle: punch}}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_obstacles_are_where_their_motion_puts_them():
+    """Whole and closed, apart from one that is called as a body."""
+    punch, floor = obstacle_snapshots(load(OBSTACLES))(0.5)
+    assert (punch.name, floor.name) == ("punch", "floor")
+    assert np.allclose([punch.points.min(axis=0), punch.points.max(axis=0)], [[0.5, 0.95, 0], [2.5, 1.95, 0]])
+    assert np.allclose([floor.points.min(axis=0), floor.points.max(axis=0)], [[0, -1, 0], [9, 0, 0]])
+    lengths = np.linalg.norm(np.diff(punch.points[punch.cells], axis=1), axis=2)
+    assert punch.cell_type == "line"
+    assert lengths.sum() == pytest.approx(6.0)
+
+
+def block(pressure=0.0):
+    fields = {"displacement": np.zeros((4, 3)), "contact_pressure": pressure * np.array([0, 0, 1.0, 0.5])}
+    fields["contact_traction"] = np.stack([0 * SQUARE[:, 0], -fields["contact_pressure"], 0 * SQUARE[:, 0]], axis=1)
+    return Snapshot("block", SQUARE, np.arange(4)[None], "quad", fields)
+
+
+def outline(size, name="floor"):
+    points = SQUARE * [size, size, 0] - [0.0, size, 0]
+    return Snapshot(name, points, np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), "line", {})
+
+
+@pytest.mark.parametrize("size", [0.1, 1e3])
+def test_an_obstacle_of_any_size_does_not_decide_on_the_view(tmp_path, size):
+    for part in (block(), outline(size)):
+        write_vtu(tmp_path / f"{part.name}.vtu", part)
+    state = load_state([tmp_path / "block.vtu", tmp_path / "floor.vtu"], "displacement")
+    assert [part.aside for part in state] == [False, True]
+    view = compose([state], "displacement", "", UNITS_OF_CASE).view
+    room = min(size, AROUND)
+    assert view.half_height == pytest.approx(0.54 * (1 + room))
+    assert view.centre[1] == pytest.approx(0.5 - room / 2)
+
+
+def test_the_largest_contact_pressure_and_its_time(tmp_path, monkeypatch):
+    titles = []
+    monkeypatch.setattr(
+        "fsci.plot.picture.plot_pressure", lambda path, moment, labels: titles.append(labels.title) or path
+    )
+    fields = FieldWriter(tmp_path / "fields")
+    for step, pressure in enumerate([0.0, 2500.0, 1000.0]):
+        fields.write(step, 0.25 * step, [block(pressure), outline(2.0)])
+    assert "final_contact_pressure.png" in [path.name for path in plot_run(tmp_path)]
+    assert titles == [f"{tmp_path.name}, largest 2.5 kPa at 0.25 s"]
+    assert largest_pressure(((0.0, tmp_path / "fields/floor_000001.vtu"),)) == 0.0
+
+
+def test_an_obstacle_across_a_plane_of_symmetry_is_whole(tmp_path):
+    fields = FieldWriter(tmp_path / "fields")
+    floor = outline(2.0)
+    floor.points[:, 0] -= 1.0
+    fields.write(0, 0.0, [block(), floor])
+    drawn = plot_run(tmp_path, times=(0.0,), mirrors=("x=0",))
+    assert [path.name for path in drawn] == ["displacement_0.png"]
+    with pytest.raises(ValueError, match="a part lies on both sides"):
+        plot_run(tmp_path, times=(0.0,), mirrors=("x=0.5",))
