@@ -27,7 +27,7 @@ Numbers = NDArray[np.integer]
 #: Intervals shorter than this part of a cell are rounding.
 EMPTY_INTERVAL = 1e-13
 #: Corners of cells as near to the plane as this, in parts of the largest coordinate, are in it.
-IN_PLANE = 1e-14
+IN_CELL_FACES = 1e-14
 #: Pairs of a cell and an edge that are looked at together.
 BATCH = 4_000_000
 
@@ -171,7 +171,7 @@ def _crossed(plane: CrossingPlane, cells: Numbers, low: Array, high: Array) -> C
     sides = list(product((0, 1), repeat=low.shape[1]))
     x = np.stack([np.where(np.asarray(side) == 1, high, low) for side in sides], axis=1)
     distance = plane.distance(x)
-    distance[np.abs(distance) <= IN_PLANE * max(np.abs(x).max(initial=0.0), np.abs(plane.point).max())] = 0.0
+    distance[np.abs(distance) <= IN_CELL_FACES * max(np.abs(x).max(initial=0.0), np.abs(plane.point).max())] = 0.0
     there = (distance.min(axis=1, initial=np.inf) < 0.0) & (distance.max(axis=1, initial=-np.inf) >= 0.0)
     x, distance = x[there], distance[there]
     part, corner = np.nonzero(distance == 0.0)
@@ -315,7 +315,7 @@ def _across(plane: CrossingPlane, parts: Crossed, part_of: Numbers, s: Array) ->
     """Least and largest t in the cell of each line."""
     origin, way = plane.at(s, np.zeros(len(s))), plane.axes[-1]
     low, high = np.full(len(s), -np.inf), np.full(len(s), np.inf)
-    for axis in np.flatnonzero(np.abs(way) > IN_PLANE):
+    for axis in np.flatnonzero(np.abs(way) > IN_CELL_FACES):
         ends = np.stack([side[part_of, axis] - origin[:, axis] for side in (parts.low, parts.high)]) / way[axis]
         low, high = np.maximum(low, ends.min(axis=0)), np.minimum(high, ends.max(axis=0))
     return low, np.maximum(low, high)
