@@ -1,4 +1,4 @@
-"""An elastic ring full of fluid between a floor and a lid, with contact on both and on itself: it keeps its volume."""
+"""Elastic walls full of fluid between a floor and a lid, with contact: they keep their volume."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,8 @@ import pytest
 from fsci.case import load_case
 from fsci.running.history import read_history
 from fsci.running.run import run_case
+from fsci.shapes import hollow_sphere
+from solvers.mesh.tessellation import tessellate
 
 CASE = """\
 time: {{step: 0.02, end: {end}}}
@@ -60,3 +62,43 @@ def test_closed_contact_squeezes_nothing_out(tmp_path, x, end):
     history, volume = squeezed(tmp_path, 0.12, end, x)
     assert history["contact.active"].max() > 3
     np.testing.assert_allclose(volume, 1.0, rtol=1e-9)
+
+
+BALL = """\
+time: {step: 0.02, end: 0.3}
+fluid:
+  density: 1
+  viscosity: 0.05
+  scheme: backward_euler
+  grid: {from: [-0.5, -0.5, 0], to: [0.5, 0.5, 0.8], cells: [10, 10, 8]}
+  patches:
+    sides: {on: [x-, x+], outflow: true}
+    walls: {on: [y-, y+, z-, z+], no_slip: true}
+  bodies:
+    lid:
+      mesh: {shape: box, size: [0.7, 0.7, 0.2], cells: [1, 1, 1], origin: [-0.35, -0.35, 0.62]}
+      motion: {displacement: ["0", "0", "-0.6*t"]}
+structure:
+  dynamics: {rho_inf: 0.5, damping: {stiffness: 0.002}}
+  bodies:
+    ball:
+      mesh: {shape: hollow_sphere, inner_radius: 0.17, outer_radius: 0.27, cells: [3, 1], translate: [0.011, 0.02, 0.3]}
+      material: {law: neo_hooke, E: 2000, nu: 0.3, density: 2}
+contact:
+  pairs:
+    lid: {slave: {body: ball, on: outer}, master: {obstacle: lid}}
+coupling: {scheme: monolithic}
+"""
+
+
+@pytest.mark.slow
+def test_a_hollow_ball_in_contact_is_tight(tmp_path):
+    """Its wall is a cell thick; the mesh of its inner surface has the volume."""
+    (tmp_path / "case.yaml").write_text(BALL)
+    assert run_case(load_case(tmp_path), tmp_path / "out") == 0
+    history = read_history(tmp_path / "out" / "history.csv")
+    mesh = hollow_sphere(0.17, 0.27, [3, 1])
+    facets, nodes = tessellate(mesh, ["inner"])
+    exact = -np.linalg.det(mesh.points[nodes][facets]).sum() / 6.0
+    assert history["contact.active"].max() > 0
+    np.testing.assert_allclose(history["fluid.pocket_1"], exact, rtol=1e-9)
