@@ -192,6 +192,8 @@ class Contact:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
+        if self.active_set.alternating:
+            self._integration.keep_normals()
         self._set_multipliers(np.where(self._constrained[:, None], self.z, 0.0))
 
     @property

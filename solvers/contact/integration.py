@@ -102,6 +102,10 @@ class Integration:
         self._sliding.begin_step(x, self._travel)
         self._rims.begin_step(active)
 
+    def keep_normals(self) -> None:
+        """Pressure near rims acts along the slave's own normals until the step ends."""
+        self._rims.keep_normals()
+
     def move(self, dx: Array) -> None:
         """Note that the nodes have moved by dx [m] since the latest iterate, shape (N, dim)."""
         self._travel += float(np.abs(dx).max(initial=0.0))

@@ -122,3 +122,11 @@ def test_integrals_of_nodes(facet_type):
     covered = mortar(xs, fs, facet_type, xm, fm, facet_type, normals, pairs).D
     name = next(name for name in SHARES if CELL_TYPES[name].kernel == facet_type)
     np.testing.assert_allclose(integrals_of_nodes(xs, fs, name), covered, atol=1e-12)
+
+
+def test_much_friction(tmp_path):
+    """Where the active set cycles, directions are normals until the step ends: the block goes through."""
+    text = SLEDGE.format(46, 12, 14, 10, "{body: block, on: bottom}", "{body: base, on: top}")
+    text = text.replace("0.16*min(t, 0.25)", "0.2*min(t, 0.25)").replace("coefficient: 0.25", "coefficient: 0.65")
+    history = run(text, tmp_path)
+    assert history["time"][-1] == 1.0
