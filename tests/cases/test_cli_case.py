@@ -175,7 +175,11 @@ def test_resume_and_plot(calls, capsys):
     assert calls == [
         ("resume", (Path("out"), []), {}),
         ("resume", (Path("out"), [("time.end", "2")]), {}),
-        ("plot", (Path("out"),), {"movie": True, "field": "velocity", "times": [0.5, 1.0], "mirrors": []}),
+        (
+            "plot",
+            (Path("out"),),
+            {"movie": True, "field": "velocity", "times": [0.5, 1.0], "mirrors": [], "lines": [], "surfaces": []},
+        ),
     ]
 
 
