@@ -71,6 +71,7 @@ class Contact:
         self.active_set = ActiveSet(count)
         self._spans = self.interface.spans  # at the latest evaluation
         self._keep_overlap = keep_overlap
+        self._begun = False  # a step that has not ended
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
         self._mean_gap = np.zeros(count)  # weighted gap over D [m], zero where D is zero
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
@@ -128,8 +129,9 @@ class Contact:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
         self._stiffnesses.begin_step()
+        cycled, self._begun = self._begun and bool(self.cycle()), True
         self.active_set.begin_step()
-        self._integration.begin_step(self.x, self.active_set.active)
+        self._integration.begin_step(self.x, self.active_set.active, along_masters=not cycled)
         self._condensation = None
         self.slip = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
@@ -140,6 +142,7 @@ class Contact:
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
+        self._begun = False
         if self._integration.has_slip:
             self.work.end_step(weight, *self._force_and_slip())
         self._of_obstacles.end_step(-self.force()[self._obstacles], (self.x - self.x_old)[self._obstacles])
@@ -192,8 +195,6 @@ class Contact:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
-        if self.active_set.alternating:
-            self._integration.keep_normals()
         self._set_multipliers(np.where(self._constrained[:, None], self.z, 0.0))
 
     @property

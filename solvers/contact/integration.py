@@ -94,17 +94,16 @@ class Integration:
         for mortar in self._mortars:
             mortar.clear_until = -np.inf
 
-    def begin_step(self, x: Array, active: NDArray[np.bool_]) -> None:
-        """Begin a step at the positions x [m], shape (N, dim); active: mask of the multipliers in contact, (C,)."""
+    def begin_step(self, x: Array, active: NDArray[np.bool_], *, along_masters: bool) -> None:
+        """Begin a step at the positions x [m], shape (N, dim); active: mask of the multipliers in contact, (C,).
+
+        along_masters: pressure near rims acts along the normals of the masters.
+        """
         self.shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(x, active)
         self._sliding.begin_step(x, self._travel)
-        self._rims.begin_step(active)
-
-    def keep_normals(self) -> None:
-        """Pressure near rims acts along the slave's own normals until the step ends."""
-        self._rims.keep_normals()
+        self._rims.begin_step(active & along_masters)
 
     def move(self, dx: Array) -> None:
         """Note that the nodes have moved by dx [m] since the latest iterate, shape (N, dim)."""

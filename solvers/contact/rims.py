@@ -8,8 +8,8 @@ no work where the slave slides up such a rise. Near rims its direction is that o
 with the normals n_m of the masters and the area A_j of the node, of which D_j is covered. a_j is the derivative of the
 weighted gap with respect to a translation of the masters. The weight w_j is the mean of D / A, within 0 and 1, over the
 nodes of the rim: no master goes on beyond a rim that none covers. It is zero in the step in which a node is pressed
-first, whose iterates may pass far through the master, and from the iterate on in which the active set of a step cycles:
-with much friction there may be no other solution. Rims are those of smooth pieces, sharp edges among them. Cuts by
+first, whose iterates may pass far through the master, and where a step is taken again because its active set cycled,
+as it may with much friction. Rims are those of smooth pieces, sharp edges among them. Cuts by
 planes of symmetry are none: there the surface goes on.
 """
 
@@ -67,10 +67,6 @@ class Rims:
     def begin_step(self, active: NDArray[np.bool_]) -> None:
         """Begin a step; active: mask of the multipliers in contact, shape (C,)."""
         self._pressed = self._near & active
-
-    def keep_normals(self) -> None:
-        """Directions are normals until the next step."""
-        self._pressed[:] = False
 
     def turned(
         self,

@@ -68,10 +68,11 @@ def create_mesh(
     # the cache finds them, would depend on whether the first was in the cache.
     kind = ufl.Cell(cell, geometric_dimension=points.shape[1])
     element = ufl.VectorElement("Lagrange", kind, degree, variant="equispaced")
+    links = cpp.graph.AdjacencyList_int64(cells)  # arrays are printed first, into a message that nobody sees
     if destinations is None:
-        return dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
+        return dolfinx_mesh.create_mesh(comm, links, points, ufl.Mesh(element))
     return dolfinx_mesh.create_mesh(
-        comm, cells, points, ufl.Mesh(element), partitioner=lambda *_: cpp.graph.AdjacencyList_int32(*destinations)
+        comm, links, points, ufl.Mesh(element), partitioner=lambda *_: cpp.graph.AdjacencyList_int32(*destinations)
     )
 
 

@@ -125,7 +125,7 @@ def test_integrals_of_nodes(facet_type):
 
 
 def test_much_friction(tmp_path):
-    """Where the active set cycles, directions are normals until the step ends: the block goes through."""
+    """A step whose active set cycles is taken again with normals for directions: the block goes through."""
     text = SLEDGE.format(46, 12, 14, 10, "{body: block, on: bottom}", "{body: base, on: top}")
     text = text.replace("0.16*min(t, 0.25)", "0.2*min(t, 0.25)").replace("coefficient: 0.25", "coefficient: 0.65")
     history = run(text, tmp_path)

@@ -184,7 +184,7 @@ def test_tip_that_crosses_a_plane_to_and_fro():
     plate, facets = block([0.23, 0.51], [1.3, 0.54])
     short, far = (Motion(plate + np.array([way, 0.0]), 0.0 * plate) for way in (-1e-5, 1e-5))
     bodies = [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))]
-    thin, again = (ThinBodies(grid, bodies, False, None) for _ in range(2))
+    thin, again = (ThinBodies(grid, bodies, (), None) for _ in range(2))
     before = [thin.sheets(facets, motion).node_count(1) for motion in (short, far)]
     assert before[1] > before[0]
     after = [thin.sheets(facets, motion).node_count(1) for motion in (short, far, short, far)]
@@ -201,7 +201,7 @@ def test_the_place_at_the_start_of_a_step_is_no_iterate():
     grid = uniform([0, 0], [3, 1], [30, 10])
     plate, facets = block([0.23, 0.51], [1.3, 0.54])
     short, far = (Motion(plate + np.array([way, 0.0]), 0.0 * plate) for way in (-1e-5, 1e-5))
-    thin = ThinBodies(grid, [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))], False, None)
+    thin = ThinBodies(grid, [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))], (), None)
     parted, joined = (thin.sheets(facets, motion).node_count(1) for motion in (far, short))
     thin.begin_step()
     thin.sheets(facets, far)
@@ -216,7 +216,7 @@ def test_body_that_becomes_thin_by_turning():
     plate, facets = block([-0.225, -1.5], [0.225, 1.5])
     straight, inclined = (Motion(turned(plate, angle) + 2.03, 0.0 * plate) for angle in (0.0, 0.8))
     bodies = [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))]
-    thin, again = (ThinBodies(grid, bodies, False, None) for _ in range(2))
+    thin, again = (ThinBodies(grid, bodies, (), None) for _ in range(2))
     assert [thin.sheets(facets, motion) for motion in (straight, inclined)] == [None, None]
     again.restore(thin.save())
     assert again.sheets(facets, inclined) is None

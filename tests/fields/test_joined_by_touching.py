@@ -26,7 +26,7 @@ def test_flaps_that_touch_and_open_within_a_step():
         return Motion(x, 0.0 * x)
 
     apart, touching = at(0.0), at(0.0101)
-    thin, other = (ThinBodies(grid, bodies, False, None) for _ in range(2))
+    thin, other = (ThinBodies(grid, bodies, (), None) for _ in range(2))
     parted = other.sheets(facets, touching)
     opened = thin.sheets(facets, apart)
     joined = thin.sheets(facets, touching)
@@ -49,7 +49,7 @@ def test_the_start_of_a_step_is_no_iterate():
     """Nor after a step with joined parts: what is at the start comes back once without being joined."""
     grid = uniform([0, 0], [2, 1], [20, 10])
     x, facets = block([0.92, -0.2], [0.95, 0.54])
-    thin = ThinBodies(grid, [body("flap", x, facets, motion=lambda x, t: (x, 0.0 * x))], False, None)
+    thin = ThinBodies(grid, [body("flap", x, facets, motion=lambda x, t: (x, 0.0 * x))], (), None)
     thin.sheets(facets, Motion(x, 0.0 * x))
     for _ in range(2):
         thin.begin_step()
