@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady, step, turned, values
 from programs import fsci
+from thin_space import duct, plate
 
 from fsci.running.history import read_history
 from solvers.fluid.flow.probes import at_point
@@ -77,6 +78,26 @@ def test_two_parabolas(thickness):
         assert drag == pytest.approx((low + 1.0 - high) / 2.0 * 2.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+def test_plate_that_closes_a_duct(element):
+    """In 3D, at rest and moved by 0.4 cells per step."""
+    grid = refined(uniform([0, 0, 0], [4.0, 0.75, 0.75], [8, 2, 2]), [RefinedBox([0, 0, 0], [2.6, 0.75, 0.75], 1)])
+    points, facets, normal = plate(0.02, np.random.default_rng(3))
+    points, speed = points + [0.2, 0.0, 0.0], np.array([0.5, 0.0, 0.0])
+    fluid = duct([body("plate", points, facets)], element, (2.0, 0.7), grid=grid, scheme="steady")
+    solve_steady(fluid)
+    force = 1.3 * 0.75**2 / normal[0] * normal
+    assert np.abs(fluid.flow[fluid.unknowns.velocity.dofs]).max() < 1e-9
+    assert np.abs(fluid.force()["plate"].sum(axis=0) - force).max() < 1e-8
+    moved = body("plate", points, facets, motion=lambda x, t: (x + t * speed, 0.0 * x + speed))
+    fluid = duct([moved], element, (1.0, 0.7), grid=grid, mu=0.05, dt=0.2, initial_velocity=field(0.5, 0.0, 0.0))
+    for number in range(3):
+        step(fluid, 0.2 * number, 0.2)
+        nodes = fluid.unknowns.velocity.dofs
+        velocity = fluid.flow[nodes][fluid.system.active_dofs[nodes[:, 0]]]
+        assert np.abs(velocity - speed).max() < 1e-9
+
+
 def pushed(thickness, element, following, number, size=0.0625, dt=0.1):
     """A plate that seals a channel and moves along it, the flow with it; largest errors of velocity and force.
 
@@ -91,13 +112,13 @@ def pushed(thickness, element, following, number, size=0.0625, dt=0.1):
         Patch("out", ("x+",), "traction", field(-pressures[1], 0.0)),
         Patch("w", ("y-", "y+"), "slip"),
     ]
-    plate = body(
+    moved = body(
         "plate", points, facets, motion=lambda x, t: (x + speed * t * along, 0.0 * x + speed * along)
     )  # fmt: skip
     around = RefinedSurface(points, facets, 4, 1) if following else RefinedBox([0.6, 0.0], [2.4, 1.0], 1)
     rule = Following(box, [], [RefinedBody("plate", 4, 1)]) if following else None
     fluid = make_fluid(
-        refined(box, [around]), patches, [plate], element=element, mu=0.05, dt=dt,
+        refined(box, [around]), patches, [moved], element=element, mu=0.05, dt=dt,
         initial_velocity=field(speed, 0.0), following=rule,
     )  # fmt: skip
     force = (pressures[0] - pressures[1]) / np.cos(angle) * np.array([np.cos(angle), np.sin(angle)])

@@ -31,14 +31,14 @@ def plate(thickness: float, rng: np.random.Generator) -> tuple[np.ndarray, np.nd
     return points @ matrix.T + middle, facets, matrix[:, 0]
 
 
-def duct(bodies: list[ImmersedBody], element: str, pressures, cells=(7, 3, 3), **settings) -> Fluid:
-    """A duct with slip walls and given pressures at its ends."""
+def duct(bodies: list[ImmersedBody], element: str, pressures, cells=(7, 3, 3), grid=None, **settings) -> Fluid:
+    """A duct with slip walls and given pressures at its ends; grid: None: equal cells."""
     patches = [
         Patch("in", ("x-",), "traction", field(pressures[0], 0.0, 0.0)),
         Patch("out", ("x+",), "traction", field(-pressures[1], 0.0, 0.0)),
         Patch("w", ("y-", "y+", "z-", "z+"), "slip"),
     ]
-    grid = uniform([0, 0, 0], SIZE * np.array(cells), cells)
+    grid = grid or uniform([0, 0, 0], SIZE * np.array(cells), cells)
     return make_fluid(grid, patches, bodies, element=element, convection=False, **settings)
 
 
