@@ -83,7 +83,7 @@ def test_plate_that_closes_a_duct(element):
     """In 3D, at rest and moved by 0.4 cells per step."""
     grid = refined(uniform([0, 0, 0], [4.0, 0.75, 0.75], [8, 2, 2]), [RefinedBox([0, 0, 0], [2.6, 0.75, 0.75], 1)])
     points, facets, normal = plate(0.02, np.random.default_rng(3))
-    points, speed = points + [0.2, 0.0, 0.0], np.array([0.5, 0.0, 0.0])
+    points, speed = points + np.array([0.2, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
     fluid = duct([body("plate", points, facets)], element, (2.0, 0.7), grid=grid, scheme="steady")
     solve_steady(fluid)
     force = 1.3 * 0.75**2 / normal[0] * normal
