@@ -107,12 +107,17 @@ class Coupled:
             self.walls.end_restore()
 
 
-def with_cause(coupled: Coupled, failure: StepFailed, *, cycles: bool) -> StepFailed:
-    """The failure of a step, with the cause where no smaller step helps (collective).
-
-    cycles: contact opens and closes again and again, on any process.
-    """
+def suction(coupled: Coupled) -> float:
+    """Suction [Pa] on dry contact that no larger load holds closed at the present iterate, else 0 (collective)."""
     pull = coupled.flow.suction()
-    if not cycles or pull <= coupled.solid.contact_pressure():  # a larger load holds contact closed
+    return pull if pull > coupled.solid.contact_pressure() else 0.0
+
+
+def with_cause(failure: StepFailed, pull: float) -> StepFailed:
+    """The failure of a step, with the cause where no smaller step helps.
+
+    pull: the largest `suction` [Pa] at the iterates between which contact opens and closes again and again.
+    """
+    if pull <= 0.0:
         return failure
     return failure.with_reason(f"{failure.reason}; {NO_STATE.format(pull=pull)}", FailureKind.SUCTION)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from coupling.blocks import Blocks
-from coupling.coupled import Coupled, with_cause
+from coupling.coupled import Coupled, suction, with_cause
 from coupling.divided import lengths, step_in_parts
 from coupling.ports import IterativeFlow
 from coupling.secant import Secant
@@ -63,6 +63,7 @@ class Monolithic:
         self._secant = Secant()
         self._linear_iterations = 0  #: of this step
         self._linearised = False  #: in this step
+        self._pull = 0.0  #: largest `suction` [Pa] of this step at iterates between which contact opens and closes
         self._residual, self._on_surfaces = np.zeros(0), 0.0  #: residual by part, load of the flow on all surfaces [N]
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is assembled already
         #: tangent of the flow, into_flow, into_solid and the derivative of the force by the motion, of the last iterate
@@ -85,7 +86,7 @@ class Monolithic:
 
     def _begin_system(self) -> None:
         """Discard derivatives and preconditioners of the last step."""
-        self._linear_iterations, self._linearised = 0, False
+        self._linear_iterations, self._linearised, self._pull = 0, False, 0.0
         self._prepared = self._of_flow = None
         self._solvers.krylov.begin_step()
         self._solvers.direct.begin_step()
@@ -131,8 +132,7 @@ class Monolithic:
             if predicted and isinstance(failure, NoResidual):
                 raise
             self._require_numbers(failure)
-            cycles = self.comm.allreduce(bool(coupled.solid.astray()), op=MPI.LOR)
-            raise with_cause(coupled, failure, cycles=cycles) from None
+            raise with_cause(failure, self._pull) from None
         coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
@@ -183,6 +183,8 @@ class Monolithic:
         solid.load(force)
         self._on_surfaces = float(np.linalg.norm(force))
         self._residual = np.concatenate([solid.residual(), of_flow])
+        if self.comm.allreduce(bool(solid.astray()), op=MPI.LOR):
+            self._pull = max(self._pull, suction(self.coupled))
         return self._residual
 
     def forces(self) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.bracket import CouplingIterate, brackets, halved
-from coupling.coupled import Coupled, with_cause
+from coupling.coupled import Coupled, suction, with_cause
 from coupling.divided import lengths, step_in_parts
 from coupling.start import start_again, start_together
 from coupling.wall_passed import WallPassed
@@ -114,7 +114,8 @@ class Partitioned:
                 failure = StepFailed(
                     "coupling", FailureKind.COUPLING, reason, iteration=len(history), history=tuple(history)
                 )
-                raise with_cause(coupled, failure, cycles=changes > 1)  # once is a contact that closes or opens
+                # once is a contact that closes or opens
+                raise with_cause(failure, suction(coupled) if changes > 1 else 0.0)
             before = np.concatenate([d.ravel(), levels])
             now = CouplingIterate(before, np.append(found, levels + squeezed), coupled.solid.touching())
             changes += last is not None and not last.same_contact(now)
