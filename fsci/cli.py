@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from fsci.argument_types import count, duration, override, share
+from fsci.failed_commands import broken, fail, with_notes
 
 DESCRIPTION = "Fluid-structure-contact interaction from one YAML case file."
 EPILOG = """\
@@ -44,7 +45,7 @@ def execute(arguments: Sequence[str]) -> int:
 
         if not is_dolfinx(error):
             raise
-        return _fail(f"fsci: {words(error)}")
+        return fail(f"fsci: {words(error)}")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -265,7 +266,7 @@ def _new(options: argparse.Namespace) -> int:
     try:
         files = new_case(options.name, options.template)
     except OSError as error:
-        return _fail(f"fsci new: cannot make the folder '{options.name}': {error.strerror}")
+        return fail(f"fsci new: cannot make the folder '{options.name}': {error.strerror}")
     print(f"wrote {' and '.join(str(path) for path in files)}; next: fsci run {options.name}")
     return 0
 
@@ -276,9 +277,9 @@ def _demo(options: argparse.Namespace) -> int:
     try:
         return demo(options.name, lambda line: print(line, flush=True))
     except DemoError as error:
-        return _fail(f"fsci demo: {error}")
+        return fail(f"fsci demo: {error}")
     except (OSError, MemoryError, KeyboardInterrupt) as error:
-        return _broken("demo", error)
+        return broken("demo", error)
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -293,7 +294,7 @@ def _check(options: argparse.Namespace) -> int:
         if found.problems:
             raise CaseError(found.problems)
     except CaseError as error:
-        return _fail(str(error))
+        return fail(str(error))
     print(f"{case.path}\n{summary(case, found.meshes, found.pairs, found.walls)}")
     if cost := in_words(case, found.meshes):
         print(f"  estimate: {cost}")
@@ -321,9 +322,9 @@ def _run(options: argparse.Namespace) -> int:
         with ending_together(MPI.COMM_WORLD, CaseError):
             return int(run_case(case, out, force=options.force))
     except CaseError as error:
-        return _fail(_with_notes(error)) if first else 2
+        return fail(with_notes(error)) if first else 2
     except (OSError, MemoryError, KeyboardInterrupt) as error:
-        return _broken("run", error)
+        return broken("run", error)
 
 
 def _preview(options: argparse.Namespace) -> int:
@@ -343,20 +344,20 @@ def _resume(options: argparse.Namespace) -> int:
         with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
             return int(resume_run(options.out, options.overrides))
     except CaseError as error:
-        return _fail(_with_notes(error)) if MPI.COMM_WORLD.rank == 0 else 2
+        return fail(with_notes(error)) if MPI.COMM_WORLD.rank == 0 else 2
     except FileNotFoundError as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"fsci resume: {error}", file=sys.stderr)
         return 1
     except (OSError, MemoryError, KeyboardInterrupt) as error:
-        return _broken("resume", error)
+        return broken("resume", error)
 
 
 def _plot(options: argparse.Namespace) -> int:
     from fsci.plot.picture import plot_run
 
     if not options.out.is_dir():
-        return _fail(f"fsci plot: there is no folder '{options.out}'")
+        return fail(f"fsci plot: there is no folder '{options.out}'")
     return _printed(
         "plot",
         lambda: plot_run(
@@ -424,18 +425,18 @@ def _several(name: str, right: Callable[[], bool]) -> int:
     try:
         return int(not right())
     except CaseError as error:
-        return _fail(str(error))
+        return fail(str(error))
     except KeyboardInterrupt:
-        return _fail("stopped; the same command goes on from here") + 1
+        return fail("stopped; the same command goes on from here") + 1
     except OSError as error:
-        return _fail(f"fsci {name}: {error}")
+        return fail(f"fsci {name}: {error}")
 
 
 def _diff(options: argparse.Namespace) -> int:
     from fsci.diff import diff
 
     if len(options.outs) < 2:
-        return _fail("fsci diff: give the folders of two or more runs")
+        return fail("fsci diff: give the folders of two or more runs")
     return _printed("diff", lambda: diff(options.outs, options.pictures))
 
 
@@ -446,9 +447,9 @@ def _printed(name: str, make: Callable[[], Iterable[object]]) -> int:
     try:
         print("\n".join(str(line) for line in make()))
     except CaseError as error:
-        return _fail(str(error))
+        return fail(str(error))
     except (OSError, ValueError, RuntimeError) as error:
-        return _fail(f"fsci {name}: {error}")
+        return fail(f"fsci {name}: {error}")
     return 0
 
 
@@ -458,14 +459,14 @@ def _bench(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if error.name != "fsci.bench":
             raise
-        return _fail("fsci bench: the benchmarks are in the repository of fsci, not in what is installed here")
+        return fail("fsci bench: the benchmarks are in the repository of fsci, not in what is installed here")
     if not options.names:
         print(describe())
         return 0
     try:
         run(options.names, options.out, options.against, options.plot)
     except BenchmarkError as error:
-        return _fail(f"fsci bench: {error}")
+        return fail(f"fsci bench: {error}")
     return 0
 
 
@@ -481,7 +482,7 @@ def _stress(options: argparse.Namespace) -> int:
     try:
         outcomes = stress(seeds, lambda line: print(line, flush=True), options.keep, scenes)
     except (SceneError, FrameError, ExpressionError, OSError) as error:
-        return _fail(f"fsci stress: {error}")
+        return fail(f"fsci stress: {error}")
     print(table(outcomes))
     if options.out is not None:
         write(outcomes, options.out)
@@ -493,21 +494,3 @@ def _schema(options: argparse.Namespace) -> int:
 
     print(reference_markdown() if options.markdown else json_schema())
     return 0
-
-
-def _with_notes(error: Exception) -> str:
-    """Its text, and below it what the run has to say about its state."""
-    return "\n".join([str(error), *getattr(error, "__notes__", ())])
-
-
-def _fail(message: str) -> int:
-    print(message, file=sys.stderr)
-    return 2
-
-
-def _broken(command: str, error: BaseException) -> int:
-    """A run on one process that the machine or the user has ended."""
-    from fsci.running.processes import describe
-
-    print(f"fsci {command}: {describe(error)}", file=sys.stderr)
-    return 3 if isinstance(error, KeyboardInterrupt) else 1
