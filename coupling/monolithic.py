@@ -177,7 +177,10 @@ class Monolithic:
         flow.follow()
 
     def residual(self) -> Array:
-        """Norm of the residual [N] of each part: those of the solid, then the flow."""
+        """Norm of the residual [N] of each part: those of the solid, then the flow (collective).
+
+        Where contact opens and closes, what the flow pulls at it is kept for the message of a step that fails.
+        """
         flow, solid = self.coupled.flow, self.coupled.solid
         of_flow, force = flow.residual(), self.coupled.force()
         solid.load(force)

@@ -10,6 +10,7 @@ from solvers.fluid.flow.probes import at_point
 from solvers.fluid.geometry.thin.sheet_windows import SheetWindows
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
 from solvers.fluid.terms.boundary.patches import Patch
 from solvers.mesh.distributed import gather, scatter
 from solvers.newton import Tolerance
@@ -91,13 +92,13 @@ def test_probes_on_both_sides():
         assert abs(at_point(fluid, "pressure", (x, 0.47), 0.0)()[""] - pressure) < 1e-10
 
 
-def two_channels(thickness, middle):
+def two_channels(thickness, middle, grid):
     """Flow on both sides of a plate along a channel, driven by a force, and the exact one; lengths in heights."""
-    h = 0.1
+    h = grid.edges[1][1]
     low, high = middle - thickness * h / 2, middle + thickness * h / 2
     patches = [Patch("ends", ("x-", "x+"), "outflow"), Patch("w", ("y-", "y+"), "no_slip")]
     fluid = make_fluid(
-        uniform([0, 0], [1, 1], [6, 10]), patches, [body("plate", *block([-0.5, low], [1.5, high]))],
+        grid, patches, [body("plate", *block([-0.5, low], [1.5, high]))],
         element="q2q1", scheme="steady", convection=False, mu=0.3, body_force=field(2.0, 0.0),
     )  # fmt: skip
     solve_steady(fluid)
@@ -112,11 +113,15 @@ def two_channels(thickness, middle):
     return off, np.abs(p[wet]).max(), drag - (low + 1.0 - high) / 2.0 * 2.0
 
 
+@pytest.mark.parametrize("nested", [False, True], ids=["equal cells", "nested cells"])
 @pytest.mark.parametrize("thickness", [1e-3, 0.2, 1.0, 1.5])
-def test_two_parabolas(thickness):
-    """Both flows are exact, also where the plate leaves the box; it carries half of the force."""
-    for middle in np.random.default_rng(5).uniform(0.3, 0.7, 8):
-        assert np.abs(two_channels(thickness, middle)).max() < 1e-12, middle
+def test_two_parabolas(thickness, nested):
+    """Both flows are exact, also where the plate leaves the box, and in coarser cells; it carries half of the force."""
+    equal = uniform([0, 0], [1, 1], [6, 10])
+    grid = refined(equal, [RefinedBox([0.0, 0.2], [1.0, 0.8], 1)]) if nested else equal
+    away = 0.1 if nested else 0.2  # from half of the height, where cells are fine
+    for middle in np.random.default_rng(5).uniform(0.5 - away, 0.5 + away, 8):
+        assert np.abs(two_channels(thickness, middle, grid)).max() < 1e-12, middle
 
 
 def test_nodes_depend_on_their_own_side():

@@ -22,6 +22,7 @@ from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.geometry.thin.walls import facets_of_walls
 from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.nested import Nested
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.surfaces.immersed import ImmersedBody
@@ -189,12 +190,12 @@ class Carrying:
 
     def __call__(self, old: Unknowns, before: Sheets | None) -> Carrier:
         """The transfer from old unknowns; before: their sheets, None: nodes of the box."""
-        degree = self._new.degree
-        matrices = {
-            one: self._matrix(before, one)[_numbers(self._new, self._after, one)][:, _numbers(old, before, one)]
-            for one in {degree, 1}
-        }
-        walls = self._walls()[_numbers(self._new, self._after, degree)]
+        degree, walls = self._new.degree, self._walls()
+        matrices = {one: self._matrix(before, one) for one in {degree, 1}}
+        if (nested := self._new.grid.nested) is not None:
+            for one, matrix in matrices.items():
+                matrices[one] = matrix[_in_mesh(nested, self._after, one)][:, _in_mesh(nested, before, one)]
+            walls = walls[_in_mesh(nested, self._after, degree)]
         return Carrier(old, self._new, matrices[degree], matrices[1], walls)
 
     def _matrix(self, before: Sheets | None, degree: int) -> sparse.csr_matrix:
@@ -205,13 +206,12 @@ class Carrying:
         return sparse.csr_matrix(entries, shape=(count, self._after.lattice_size(degree)))
 
 
-def _numbers(unknowns: Unknowns, sheets: Sheets | None, degree: int) -> NDArray[np.int64] | slice:
-    """Numbers of nodes in the order of `FlowNodes.consecutive`."""
-    if (nested := unknowns.grid.nested) is None:
-        return slice(None)
-    size = int(np.prod(unknowns.lattice_shape(degree)))
-    further = size if sheets is None else sheets.node_count(degree)
-    return np.concatenate([nested.all_nodes(degree), np.arange(size, further)])
+def _in_mesh(nested: Nested, sheets: Sheets | None, degree: int) -> NDArray[np.int64]:
+    """Numbers of the nodes that the mesh of nested cells has, in the order of `FlowNodes.consecutive`."""
+    nodes = nested.all_nodes(degree)
+    if sheets is None:
+        return nodes
+    return np.concatenate([nodes, np.arange(sheets.lattice_size(degree), sheets.node_count(degree))])
 
 
 def _seen(sides: Sides, of_facets: Array) -> Array:

@@ -72,7 +72,10 @@ class FluidShare:
 
 @dataclass(frozen=True)
 class Sheets:
-    """Cells that follow those of the box: first those with fluid, then pairs of cells with a face between them."""
+    """Cells that follow those of the box: first those with fluid, then pairs of cells with a face between them.
+
+    In nested cells the box is the finest lattice, of which all cells near surfaces are. Elsewhere the mesh has coarser ones.
+    """
 
     grid: Grid
     shares: dict[int, FluidShare]  #: of cells of the mesh, by their numbers in it

@@ -92,9 +92,10 @@ class MeanIntegrands:
         return numbers, fem.Pointwise(domain, ufl.as_vector([*moved, *slopes]), np.zeros((1, dim)), what)
 
     def on(self, at: InterfaceTerms, origin: Array, inertia: Array, means: Array, slopes: Array) -> tuple[Array, Array]:
-        """(by test functions e_i of momentum, 1 and x_k of continuity, (pieces, 2 dim + PARAMETERS, 2 dim + 1); slopes
+        """The derivatives for constant test functions, and for linear ones of momentum.
 
-        for x_k e_i of momentum, (pieces, k, i, dim)).
+        Returns those for e_i of momentum and 1 and x_k of continuity, (pieces, 2 dim + PARAMETERS, 2 dim + 1), and the
+        slopes for x_k e_i of momentum, (pieces, k, i, dim).
         origin: of the cells of pieces [m], (pieces, dim); inertia: traction of slip in earlier steps [Pa]; means: of
         u - g and p, (pieces, dim + 1); slopes: of u and p, (pieces, dim + 1, dim).
         """
