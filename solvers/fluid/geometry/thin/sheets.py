@@ -74,7 +74,7 @@ class FluidShare:
 class Sheets:
     """Cells that follow those of the box: first those with fluid, then pairs of cells with a face between them.
 
-    In nested cells the box is the finest lattice, which has all cells near surfaces; elsewhere the mesh has coarser ones.
+    In nested cells the box is the finest lattice: it has all cells near surfaces. Coarser ones are in the mesh alone.
     """
 
     grid: Grid
