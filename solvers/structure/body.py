@@ -22,7 +22,8 @@ from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
 from solvers.structure.elements import Displacement, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
-from solvers.structure.materials import Material, parameters
+from solvers.structure.materials import Material, Ogden, parameters
+from solvers.structure.principal import ByPrincipalStretches, PrincipalStretches
 from solvers.structure.relaxation import Branch, Relaxing
 from solvers.structure.springs import Spring, Springs
 from solvers.structure.supports import Roller, Support, Symmetry
@@ -125,12 +126,17 @@ class Body:
         return cellwise
 
     def _element(self, dx: ufl.Measure, relaxing: Sequence[Branch]) -> Element:
-        element: Element = Displacement(self.material, self.parameters)
+        law, stretches = self.material, None
+        if isinstance(law, Ogden):
+            F = forms.deformation_gradient(self.u)
+            stretches = PrincipalStretches(self.domain, law, F, self.stiffness_degree)
+            law = stretches.law
+        element: Element = Displacement(law, self.parameters)
         if self.formulation == "mixed":
-            element = Mixed(self.domain, self.u, self.material, self.parameters, dx)
-        if not relaxing:
-            return element
-        return Relaxing(element, self.domain, self.u, self.parameters, self.stiffness_degree, relaxing)
+            element = Mixed(self.domain, self.u, law, self.parameters, dx)
+        if relaxing:
+            element = Relaxing(element, self.domain, self.u, self.parameters, self.stiffness_degree, relaxing)
+        return element if stretches is None else ByPrincipalStretches(element, stretches)
 
     def _compiled(self) -> Sequence[Any]:
         """Energy, internal force, its tangent and the mass."""
