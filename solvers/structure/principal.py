@@ -70,7 +70,6 @@ class PrincipalStretches:
         points, _ = fem.quadrature_points(domain, degree)
         self._gradient = fem.compile_expression(in_space(F), points)
         self._terms = law.moduli(fem.cell_midpoints(domain)[:, :owned])
-        self._in_plane = [3 * i + j for i in range(dim) for j in range(dim)]
         self._present: Spectral | None = None
         self._F = F
         self.update()
@@ -93,8 +92,7 @@ class PrincipalStretches:
     def linearise(self) -> None:
         """The tangent there."""
         assert self._present is not None
-        slope = tangent(self._present, self._terms_at(self._blocks[0].shape[1]))
-        self._write(3, slope[:, self._in_plane][:, :, self._in_plane])
+        self._write(3, tangent(self._present, self._terms_at(self._blocks[0].shape[1]), self._domain.dim))
 
     def _write(self, k: int, values: Array) -> None:
         blocks, field = self._blocks[k], self._fields[k]

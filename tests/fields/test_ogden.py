@@ -1,10 +1,12 @@
-"""Ogden's law: stresses by hand at large stretches, its tangent, and the laws that it contains."""
+"""Ogden's law: stresses by hand at large stretches, its tangent, the laws that it contains, and case files."""
 
 import numpy as np
 import pytest
 from structure_setup import block, distort, make_structure
+from test_soft_tissue import BULK, CUBE, forces
 from test_structure_tangent import deformed, tangent_error
 
+from fsci.case import CaseError, load_case
 from solvers.structure.materials import MooneyRivlin, Ogden
 from solvers.structure.materials.ogden import at_gradients, tangent
 from solvers.structure.relaxation import Branch
@@ -109,3 +111,29 @@ def test_tangent_of_a_body(element, cell_type):
         distort(block(cell_type, 2), 0.05), varying, element=element, relaxing=[Branch(0.3, 0.1)]
     )
     assert tangent_error(structure) < 1e-6
+
+
+def test_rubber_in_two_directions(tmp_path):
+    """A case file with Treloar's rubber: nominal stress sum mu (l^a - h^a) / l with the height h = 1/(l m)."""
+    terms = ", ".join(f"{{mu: {mu}, alpha: {alpha}}}" for mu, alpha in TRELOAR)
+    x, y, length, width = forces(tmp_path, f"{{law: ogden, terms: [{terms}], bulk: {BULK}}}", 5.0, 1.5)
+    height = 1.0 / (length * width)
+    for force, one in ((x, length), (y, width)):
+        exact = sum(mu * (one**a - height**a) / one for mu, a in TRELOAR)
+        assert force == pytest.approx(exact, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("terms", "message"),
+    [
+        ("[{mu: 1, alpha: 0}]", "'alpha' must not be 0"),
+        ("[{mu: 1, alpha: 2}, {mu: 1, alpha: -2}]", "'mu' must have the sign of alpha = -2, or the law is unstable"),
+        ("[]", "must have 1 or more entries, not 0"),
+    ],
+)
+def test_mistakes_in_terms(tmp_path, terms, message):
+    material = f"{{law: ogden, terms: {terms}, bulk: 1e3}}"
+    (tmp_path / "case.yaml").write_text(CUBE.format(material=material, step=1, across=0, along=0))
+    with pytest.raises(CaseError) as error:
+        load_case(tmp_path)
+    assert message in str(error.value)

@@ -30,7 +30,8 @@ class Spectral(NamedTuple):
     energy: Array  #: of the distortion [J/m^3], shape (n,)
     stress: Array  #: P [Pa], shape (n, 3, 3)
     logarithms: Array  #: ln l_a, shape (n, 3)
-    frames: Array  #: n_a N_b^T by a and b, as vectors by rows, shape (n, 9, 9): the entry ij, then ab
+    spatial: Array  #: n_a in columns, shape (n, 3, 3)
+    material: Array  #: N_a in columns, shape (n, 3, 3)
 
 
 @dataclass(frozen=True)
@@ -89,12 +90,11 @@ def at_gradients(F: Array, terms: list[tuple[Array, float]]) -> Spectral:
         stress += modulus[:, None] * (grown - grown.mean(axis=1, keepdims=True))
     stress *= np.exp(-logarithms)
     P = (n * stress[:, None, :]) @ N.swapaxes(1, 2)
-    frames = np.einsum("nia,njb->nijab", n, N).reshape(-1, 9, 9)
-    return Spectral(energy, P, logarithms, frames)
+    return Spectral(energy, P, logarithms, n, N)
 
 
-def tangent(found: Spectral, terms: list[tuple[Array, float]]) -> Array:
-    """dP/dF [Pa] of the distortion, entries of P and F by rows, shape (n, 9, 9)."""
+def tangent(found: Spectral, terms: list[tuple[Array, float]], dim: int = 3) -> Array:
+    """dP/dF [Pa] of the distortion, the first `dim` rows and columns of P and F by rows, shape (n, dim^2, dim^2)."""
     logarithms, stretches = found.logarithms, np.exp(found.logarithms)
     deviator = np.eye(3) - 1 / 3
     stress, slopes = np.zeros_like(stretches), np.zeros((len(stretches), 3, 3))  # by logarithms
@@ -121,7 +121,8 @@ def tangent(found: Spectral, terms: list[tuple[Array, float]]) -> Array:
             if a != b:
                 local[:, 3 * a + b, 3 * a + b] = (difference[:, a, b] + sums[:, a, b]) / 2
                 local[:, 3 * a + b, 3 * b + a] = (difference[:, a, b] - sums[:, a, b]) / 2
-    return found.frames @ local @ found.frames.swapaxes(1, 2)
+    frames = np.einsum("nia,njb->nijab", found.spatial[:, :dim], found.material[:, :dim]).reshape(-1, dim**2, 9)
+    return frames @ local @ frames.swapaxes(1, 2)
 
 
 def _distortion(logarithms: Array) -> Array:
