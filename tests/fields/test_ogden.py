@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from programs import fsci
 from structure_setup import block, distort, make_structure
 from test_soft_tissue import BULK, CUBE, forces
 from test_structure_tangent import deformed, tangent_error
 
 from fsci.case import CaseError, load_case
+from fsci.running.history import read_history
 from solvers.structure.materials import MooneyRivlin, Ogden
 from solvers.structure.materials.ogden import at_gradients, tangent
 from solvers.structure.relaxation import Branch
@@ -137,3 +139,59 @@ def test_mistakes_in_terms(tmp_path, terms, message):
     with pytest.raises(CaseError) as error:
         load_case(tmp_path)
     assert message in str(error.value)
+
+
+PRESSED = """
+time: {{step: 0.1, end: 0.4}}
+structure:
+  dynamics: {{rho_inf: 0.8}}
+  bodies:
+    pad:
+      mesh: {{shape: rectangle, size: [1.0, 0.5], cells: [6, 3], translate: [0.033, 0]}}
+      element: mixed
+      material: {{{law}, density: 0.01, viscous: [{{share: 0.3, time: 0.2}}]}}
+      active: [{{direction: [1, 0.3], stress: 0.1*t}}]
+      pre_stretch: [{{direction: [1, 0], stretch: 1.05}}]
+      supports: [{{on: top, displacement: ["0.1*t", "-0.3*t"]}}]
+contact:
+  friction: {{coefficient: 0.3}}
+  obstacles: {{floor: {{mesh: {{shape: rectangle, size: [4, 0.1], cells: [1, 1], origin: [-2, -0.11]}}, on: top}}}}
+  pairs: {{floor: {{slave: {{body: pad, on: bottom}}, master: {{obstacle: floor}}}}}}
+solver: {{newton: {{residual: 1e-11}}}}
+probes:
+  top: {{body: pad, quantity: reaction, on: top}}
+  left: {{body: pad, quantity: traction, on: left}}
+  energy: {{quantity: energy}}
+"""
+
+
+def test_pressed_and_dragged(tmp_path):
+    """In contact with friction, in motion: as the law that it contains; resumed bit for bit; on two processes."""
+    terms = "[{mu: 2, alpha: 2}, {mu: -1, alpha: -2}]"
+    laws = {
+        "ogden": f"law: ogden, terms: {terms}, bulk: 70",
+        "mooney": "law: mooney_rivlin, c10: 1, c01: 0.5, bulk: 70",
+    }
+    found = {}
+    for name, law, processes, end in (
+        *((name, law, 1, 0.4) for name, law in laws.items()),
+        ("two", laws["ogden"], 2, 0.4),
+        ("half", laws["ogden"], 1, 0.2),
+    ):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "case.yaml").write_text(PRESSED.format(law=law))
+        ended = fsci("run", folder, "-o", folder / "out", "--set", f"time.end={end}", processes=processes)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        if name == "half":
+            ended = fsci("resume", folder / "out", "--set", "time.end=0.4")
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+        found[name] = read_history(folder / "out" / "history.csv")
+    ours = found["ogden"]
+    assert ours["top.y"][-1] < -0.1
+    for column in ("top.x", "top.y", "left.x", "energy.internal", "contact.floor.x"):
+        size = np.abs(ours[column]).max()
+        assert np.array_equal(found["half"][column], ours[column])
+        assert found["two"][column] == pytest.approx(ours[column], abs=1e-8 * size)
+        if column != "left.x":  # on a facet Ogden's stress is interpolated from nodes
+            assert found["mooney"][column] == pytest.approx(ours[column], abs=1e-8 * size)

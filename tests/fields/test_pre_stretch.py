@@ -70,6 +70,7 @@ def test_free_bar_returns_to_its_free_length(tmp_path, material, element, angle,
     assert along[1:] == pytest.approx(2.0 / stretch - 2.0, rel=1e-8)
     assert -s * found["right.x"] + c * found["right.y"] == pytest.approx(0.0, abs=1e-8)
     assert found["energy.internal"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert found["cut.x"][-1] == pytest.approx(0.0, abs=1e-8)
 
 
 def held_stress(stretch, lmbda):
