@@ -50,7 +50,8 @@ class ActiveSection(Section):
 class PreStretchSection(Section):
     """A stretch that the body has in its mesh already: without supports and loads it would be shorter by `stretch`.
 
-    The stress is that of F_e = F G, with the product G of all stretches of the list.
+    The stress is that of F_e = F G, with the product G of all stretches of the list. It is there from the first step
+    on: thin bodies that it bends may need `line_search: true` of Newton's method.
     """
 
     stretch: PositiveFormula = setting(..., "length in the mesh by free length", unit="1")

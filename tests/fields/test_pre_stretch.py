@@ -9,7 +9,7 @@ from test_structure_tangent import tangent_error
 from fsci.case import CaseError, load_case
 from fsci.running.history import read_history
 from solvers.structure.active import Active
-from solvers.structure.materials import LinearElastic, NeoHooke, Ogden
+from solvers.structure.materials import LinearElastic, NeoHooke, Ogden, PlaneStressStVenantKirchhoff
 from solvers.structure.pre_stretch import PreStretch
 from solvers.structure.relaxation import Branch
 
@@ -140,6 +140,14 @@ def test_stress_of_small_displacements():
     ).bodies[0]
     exact = 0.01 * (2.0 * MU * np.outer([0.6, 0, 0.8], [0.6, 0, 0.8]) + LAMBDA * np.eye(3))
     assert body.stress()[0].reshape(3, 3) == pytest.approx(exact, abs=1e-12)
+
+
+def test_plane_stress():
+    """Held at rest: S = (lambda' + 2 mu) (s^2 - 1)/2, sigma = s S."""
+    law = PlaneStressStVenantKirchhoff(MU, LAMBDA)
+    body = make_structure(block("quad", 1), law, pre_stretch=[PreStretch(1.2, (1.0, 0.0))]).bodies[0]
+    exact = (LAMBDA + 2.0 * MU) * (1.2**2 - 1.0) / 2.0 * 1.2
+    assert body.stress()[0][0] == pytest.approx(exact, rel=1e-12)
 
 
 @pytest.mark.parametrize(
