@@ -78,6 +78,7 @@ EXAMPLES = {
     "Traction": 'tractions:\n  - {on: right, value: [0, "-1e3*ramp(t, 0, 1)"]}',
     "Pressure": 'pressures:\n  - {on: [inner, start], value: "2e3*t"}',
     "Active": 'active:\n  - {direction: [1, 0, 0.2], stress: "6e4*ramp(t, 0, 1)"}',
+    "PreStretch": "pre_stretch: [{direction: [1, 0, 0], stretch: 1.2}]",
     "LineForce": "line_forces:\n  - {on: edge, value: [0, 0, -10]}",
     "PointForce": "point_forces:\n  - {at: [1, 0.05], value: [0, -10]}",
     "Fluid": FLUID,

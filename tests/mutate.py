@@ -32,7 +32,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "structure": (
         ("solvers/structure/forms.py", *(f"solvers/structure/materials/{name}.py" for name in (
             "material", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "st_venant_kirchhoff", "linear_elastic",
-            "yeoh", "holzapfel_gasser_ogden",
+            "yeoh", "holzapfel_gasser_ogden", "ogden",
         )), "solvers/structure/relaxation.py"),
         (
             "structure_tangent", "structure_patch", "mixed_element", "elastic_constants", "linear_kinematics",

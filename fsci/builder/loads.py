@@ -8,10 +8,12 @@ import numpy as np
 
 from fsci.case.structure import BodySection
 from fsci.case.supports import SpringSection, SupportSection
+from fsci.case.values import value_of
 from fsci.meshes.locations import Locations
 from solvers.structure.active import Active
 from solvers.structure.body import Spring, Support, Symmetry
 from solvers.structure.loads import LineForce, PointForce, Pressure, Traction
+from solvers.structure.pre_stretch import PreStretch
 from solvers.structure.supports import Roller
 
 
@@ -28,6 +30,7 @@ def build_loads(body: BodySection, locations: Locations) -> dict[str, tuple[Any,
         "tractions": each("tractions", lambda load, where: Traction(where, load.value)),
         "pressures": each("pressures", lambda load, where: Pressure(where, load.value)),
         "active": tuple(Active(one.direction, one.stress) for one in body.active),
+        "pre_stretch": tuple(PreStretch(value_of(one.stretch), one.direction) for one in body.pre_stretch),
         "line_forces": each("line_forces", lambda load, where: LineForce(where[0], where[1], load.value)),
         "point_forces": each("point_forces", lambda load, where: PointForce(where, load.value)),
     }

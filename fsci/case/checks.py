@@ -163,7 +163,7 @@ def vectors_of(body: BodySection) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
     """Path from a body and value of all vectors of its material, supports, springs and loads."""
     for i, direction in enumerate(getattr(body.material, "fibres", ())):
         yield ("material", "fibres", i), direction
-    for kind in ("supports", "springs", "tractions", "active", "line_forces", "point_forces"):
+    for kind in ("supports", "springs", "tractions", "active", "pre_stretch", "line_forces", "point_forces"):
         for i, item in enumerate(getattr(body, kind)):
             for name in ("at", "displacement", "direction", "value"):
                 vector = getattr(item, name, None)

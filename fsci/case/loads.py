@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
 from fsci.case.supports import AT, Located
-from fsci.case.values import Formula, NumberVector, SpaceVector, Surfaces, Vector
+from fsci.case.values import Formula, NumberVector, PositiveFormula, SpaceVector, Surfaces, Vector
+
+T = TypeVar("T", bound="ActiveSection | PreStretchSection")
+
+
+def _with_direction(section: T) -> T:
+    if section.direction is not None and all(entry.constant == 0.0 for entry in section.direction):
+        raise fault("must not be zero", "direction")
+    return section
 
 
 class TractionSection(Section):
@@ -34,9 +44,24 @@ class ActiveSection(Section):
 
     @model_validator(mode="after")
     def _not_zero(self) -> ActiveSection:
-        if all(entry.constant == 0.0 for entry in self.direction):
-            raise fault("must not be zero", "direction")
-        return self
+        return _with_direction(self)
+
+
+class PreStretchSection(Section):
+    """A stretch that the body has in its mesh already: without supports and loads it would be shorter by `stretch`.
+
+    The stress is that of F_e = F G, with the product G of all stretches of the list. It is there from the first step
+    on: thin bodies that it bends may need `line_search: true` of Newton's method.
+    """
+
+    stretch: PositiveFormula = setting(..., "length in the mesh by free length", unit="1")
+    direction: SpaceVector | None = setting(
+        None, "direction in the mesh, of any length; default: all, in 2D those of the plane"
+    )
+
+    @model_validator(mode="after")
+    def _not_zero(self) -> PreStretchSection:
+        return _with_direction(self)
 
 
 class LineForceSection(Section):

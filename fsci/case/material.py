@@ -13,6 +13,7 @@ from fsci.case.values import (
     EntryCount,
     Name,
     NotNegativeFormula,
+    Number,
     PoissonFormula,
     Positive,
     PositiveFormula,
@@ -163,6 +164,46 @@ class YeohSection(Section):
         return value_of(self.c10), _or_zero(self.c20), _or_zero(self.c30), value_of(self.bulk)
 
 
+class OgdenTermSection(Section):
+    """A term of Ogden's law."""
+
+    mu: SpaceFormula = setting(..., "factor mu_p; its sign is that of alpha", unit="Pa")
+    alpha: Number = setting(..., "exponent alpha_p of the principal stretches", unit="1")
+
+    @model_validator(mode="after")
+    def _stiff(self) -> OgdenTermSection:
+        if self.alpha == 0:
+            raise fault("must not be 0", "alpha")
+        if self.mu.constant is not None and self.mu.constant * self.alpha <= 0:
+            raise fault(f"must have the sign of alpha = {self.alpha:g}, or the law is unstable", "mu")
+        return self
+
+
+class OgdenSection(Section):
+    """W = sum of mu_p/alpha_p (m1^alpha_p + m2^alpha_p + m3^alpha_p - 3) + bulk/2 (J - 1)^2; for rubber.
+
+    m1, m2 and m3 are the principal stretches times J^(-1/3). The shear modulus is half of the sum of mu_p alpha_p.
+    """
+
+    law: Literal["ogden"] = setting(..., "stored energy")
+    terms: Annotated[tuple[OgdenTermSection, ...], EntryCount(1, None)] = setting(..., "mu_p and alpha_p of each term")
+    bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
+    density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+    viscous: Viscous = setting(tuple, VISCOUS)
+
+    @property
+    def lame(self) -> tuple[Value, Value]:
+        """(mu, lambda) at small strains."""
+        moduli = (combine(lambda mu, alpha=term.alpha: mu * alpha / 2, value_of(term.mu)) for term in self.terms)
+        mu = combine(lambda *parts: sum(parts), *moduli)
+        return mu, combine(constants.lambda_of_bulk, mu, value_of(self.bulk))
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """The arguments of the law before the density."""
+        return tuple((value_of(term.mu), term.alpha) for term in self.terms), value_of(self.bulk)
+
+
 class HolzapfelGasserOgdenSection(Section):
     """A matrix with one or two families of fibres that carry tension only, for arteries and other soft tissue.
 
@@ -250,8 +291,11 @@ def has_mass(material: MaterialSection) -> bool:
     return material.density is not None and material.density.constant != 0.0
 
 
-LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "yeoh", "holzapfel_gasser_ogden")
-LawSection: TypeAlias = ElasticSection | MooneyRivlinSection | YeohSection | HolzapfelGasserOgdenSection
+LAWS = (
+    *("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "yeoh", "ogden"),
+    "holzapfel_gasser_ogden",
+)
+LawSection: TypeAlias = ElasticSection | MooneyRivlinSection | YeohSection | OgdenSection | HolzapfelGasserOgdenSection
 MaterialSection: TypeAlias = LawSection | OwnLawSection
 
 
@@ -271,6 +315,11 @@ MATERIAL_EXAMPLES = {
     "Elastic": "material: {law: neo_hooke, E: 4000, nu: 0.4, density: 1000}",
     "MooneyRivlin": "material: {law: mooney_rivlin, c10: 3e5, c01: 1e5, bulk: 5e8, density: 1100}",
     "Yeoh": "material: {law: yeoh, c10: 2e5, c20: -4e3, c30: 300, bulk: 1e8, density: 1100}",
+    "Ogden": (
+        "material: {law: ogden, terms: [{mu: 6.3e5, alpha: 1.3}, {mu: 1.2e3, alpha: 5}, {mu: -1e4, alpha: -2}],\n"
+        "           bulk: 1e9}"
+    ),
+    "OgdenTerm": "terms: [{mu: 6.3e5, alpha: 1.3}, {mu: -1e4, alpha: -2}]",
     "HolzapfelGasserOgden": (
         "material: {law: holzapfel_gasser_ogden, mu: 7.6e3, k1: 9.966e5, k2: 524.6, dispersion: 0.226,\n"
         "           fibres: [[1, 0, 0.85], [1, 0, -0.85]], bulk: 1e6, density: 1100}"

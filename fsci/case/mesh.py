@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 from fsci.case.section import Section, fault, setting
 from fsci.case.shapes import AnyShape, PlacedMesh
 from fsci.case.values import (
+    Count,
     CountOrZero,
     EntryCount,
     Name,
@@ -55,7 +56,7 @@ class FileMesh(PlacedMesh):
     """
 
     file: Text = setting(..., "path of the file, relative to the case file")
-    order: Order = setting(1, "polynomial order of the cells (.geo only; other files have theirs)")
+    order: Order = setting(1, "polynomial order of the cells (.geo, and with 'thickness'; other files have theirs)")
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
     size_factor: Positive = setting(
         1.0,
@@ -66,10 +67,23 @@ class FileMesh(PlacedMesh):
     scale: Positive = setting(
         1.0, "factor of all coordinates of the file, before anything else: 0.001 for a file in mm", unit="1"
     )
+    thickness: Positive | None = setting(
+        None,
+        "the file is a surface in space (STL, too), in 2D lines: it becomes the middle of a body with this thickness "
+        "and the surfaces top, where normals point, bottom and edge; named parts of the edge keep their names",
+        unit="m",
+    )
+    layers: Count = setting(1, "number of cells through the thickness")
     surfaces: dict[Name, MeshSurface] = setting(dict, "more surfaces by name, where the file has no names")
     refine: CountOrZero = setting(
         0, "how often edges are halved, so that each cell becomes four, in 3D eight; the surface stays what it is"
     )
+
+    @model_validator(mode="after")
+    def _of_layers(self) -> FileMesh:
+        if self.thickness is None and "layers" in self.model_fields_set:
+            raise fault("'layers' belongs to 'thickness'", "layers")
+        return self
 
 
 def _file_or_shape(value: Any) -> Any:

@@ -73,5 +73,5 @@ def _file(mesh: FileMesh, folder: Path, keys: Keys) -> Iterator[Mistake]:
         yield (*keys, "file"), f"mesh file '{mesh.file}' not found in {folder.absolute()}"
     if path.suffix != ".geo":
         for name in ("order", "parameters"):
-            if name in mesh.model_fields_set:
+            if name in mesh.model_fields_set and not (name == "order" and mesh.thickness is not None):
                 yield (*keys, name), f"'{name}' is for .geo files; '{mesh.file}' has its own"

@@ -27,7 +27,7 @@ CHANGEABLE = (
         f"structure.bodies.*.{name}"
         for name in (
             *("material", "supports", "springs", "gravity", "body_force", "tractions", "pressures", "line_forces"),
-            *("point_forces", "point_springs", "slip_length"),
+            *("active", "pre_stretch", "point_forces", "point_springs", "slip_length"),
         )
     ),
     *(f"fluid.{name}" for name in ("density", "viscosity", "gravity", "body_force", "dynamics")),

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, model_validator
 
 from fsci.case.free_body import PointSpringSection
-from fsci.case.loads import ActiveSection, LineForceSection, PointForceSection, PressureSection, TractionSection
+from fsci.case.loads import (
+    ActiveSection,
+    LineForceSection,
+    PointForceSection,
+    PressureSection,
+    PreStretchSection,
+    TractionSection,
+)
 from fsci.case.material import Material
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
@@ -115,6 +122,9 @@ class BodySection(Section):
     tractions: tuple[TractionSection, ...] = setting(tuple, "dead loads on surfaces")
     pressures: tuple[PressureSection, ...] = setting(tuple, "follower loads on surfaces")
     active: tuple[ActiveSection, ...] = setting(tuple, "stresses along fibres, as of muscles")
+    pre_stretch: tuple[PreStretchSection, ...] = setting(
+        tuple, "stretches of the body in its mesh, one after another, of which it would be free without the rest"
+    )
     line_forces: tuple[LineForceSection, ...] = setting(tuple, "dead loads along lines, 3D only")
     point_forces: tuple[PointForceSection, ...] = setting(tuple, "dead loads at points")
     slip_length: NotNegative = setting(

@@ -17,6 +17,7 @@ from fsci.meshes.parts import beside
 from fsci.meshes.scripts import GMSH, MESHES, SCRIPTS, RefusedScript, require_harmless
 from fsci.meshes.serendipity import COMPLETE, complete
 from fsci.meshes.surface import BadSurface, cones, split
+from fsci.meshes.thickened import BadSheet, Sheet, thickened
 from solvers.mesh.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.topology import boundary_facets, find_facets, signed_volumes
@@ -75,10 +76,11 @@ def read_mesh(
     size_factor: float = 1.0,
     *,
     rigid: bool = False,
+    sheet: Sheet | None = None,
 ) -> Mesh:
     """The mesh of a file; `order` (1 or 2), `parameters` (for DefineConstant) and `size_factor` are for .geo scripts.
 
-    rigid: a closed surface is enough.
+    rigid: a closed surface is enough; sheet: the file is a surface, which becomes a body of layers.
 
     Raises MeshError: file missing or unreadable, unknown parameter, several cell types or a foreign one, a script that
     would do more than make a mesh.
@@ -101,10 +103,12 @@ def read_mesh(
     else:
         content = _read_meshio(path)
     try:
+        if sheet is not None:
+            return _layered(content, sheet)
         if rigid and _in_space(content):
             return _enclosed(content)
         return _mesh(content, scripted=path.suffix in SCRIPTS)
-    except (MeshError, BadSurface) as error:
+    except (MeshError, BadSurface, BadSheet) as error:
         raise MeshError(f"{path.name}: {error}") from None
 
 
@@ -174,6 +178,36 @@ def _enclosed(content: Content) -> Mesh:
             those = start + (each * cells[:, None] + np.arange(each)).ravel()
             surfaces[name] = np.union1d(surfaces.get(name, those), those)
     return cones(points, np.concatenate(triangles), np.concatenate(numbers), surfaces)
+
+
+def _layered(content: Content, sheet: Sheet) -> Mesh:
+    """The body of layers around the surface of a file, or in the plane around its lines."""
+    dim = max((block.dim for block in content.blocks), default=0)
+    faces = [(k, block) for k, block in enumerate(content.blocks) if block.dim == dim]
+    first_order = {block.first_order for _, block in faces}
+    if dim not in (1, 2) or not first_order <= ({"line"} if dim == 1 else {"triangle", "quad"}):
+        there = " and ".join(sorted({block.cell_type for _, block in faces})) or "none"
+        raise MeshError(
+            f"'thickness' takes a surface of triangles or quadrilaterals, or lines in 2D; its cells: {there}"
+        )
+    points = np.asarray(content.points[:, :3], dtype=float)
+    if dim == 1 and not _is_plane(points):
+        raise MeshError("'thickness' takes lines in the plane z = 0; these are lines in space")
+    points = points[:, : dim + 1]
+    if points.shape[1] <= dim:
+        points = np.column_stack([points, np.zeros(len(points))])
+    corners = [block.nodes[:, : CELL_TYPES[block.first_order].corners] for _, block in faces]
+    _require_positions(points, np.unique(np.concatenate([nodes.ravel() for nodes in corners])))
+    if len({nodes.shape[1] for nodes in corners}) > 1:
+        corners = [split(points, nodes) if nodes.shape[1] == 4 else nodes for nodes in corners]
+    rims: dict[str, Indices] = {}
+    for name, number, cells in content.groups:
+        block = content.blocks[number]
+        if block.dim == dim - 1:
+            nodes = block.nodes[cells, :dim]
+            rims[name] = np.concatenate([rims[name], nodes]) if name in rims else nodes
+    facets, _, _ = _once(np.concatenate(corners))
+    return thickened(points, facets, sheet, rims)
 
 
 def _completed(content: Content) -> tuple[Content, str]:

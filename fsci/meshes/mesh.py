@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fsci.meshes.files import MeshError, read_mesh, unknown
 from fsci.meshes.named import with_surfaces
 from fsci.meshes.refine import refined
+from fsci.meshes.thickened import Sheet
 from fsci.rotation import rotation_matrix
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh
@@ -30,9 +31,12 @@ def build_mesh(settings: Any, folder: Path, *, rigid: bool = False) -> Mesh:
         mesh = settings.plan.mesh()
     else:
         order, parameters = getattr(settings, "order", None), getattr(settings, "parameters", None)
-        size_factor = getattr(settings, "size_factor", 1.0)
-        mesh = read_mesh(folder / settings.file, order, parameters, size_factor, rigid=rigid)
-        mesh = replace(mesh, points=mesh.points * getattr(settings, "scale", 1.0))
+        size_factor, scale = getattr(settings, "size_factor", 1.0), getattr(settings, "scale", 1.0)
+        sheet = None
+        if (thickness := getattr(settings, "thickness", None)) is not None:
+            sheet, order = Sheet(thickness / scale, settings.layers, order or 1), 1
+        mesh = read_mesh(folder / settings.file, order, parameters, size_factor, rigid=rigid, sheet=sheet)
+        mesh = replace(mesh, points=mesh.points * scale)
         mesh = with_surfaces(mesh, getattr(settings, "surfaces", {}))
         mesh = _refined(mesh, getattr(settings, "refine", 0))
     if getattr(settings, "mirror", None) is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
@@ -69,9 +70,20 @@ def _check(path: Path, seen: set[Path], *, script: bool) -> None:
         return
     text = path.read_bytes().decode("latin-1")
     tokens = list(_tokens(path, text))
+    _require_line_break(path, text, tokens)
     for index, token in enumerate(tokens):
         if token.kind == "name":
             _check_word(path, tokens, index, seen)
+
+
+def _require_line_break(path: Path, text: str, tokens: list[Token]) -> None:
+    """Of a last line without a line break gmsh reads the first statement only, and says nothing."""
+    last = [token for token in tokens if token.line == 1 + text.count("\n")]
+    depths = accumulate((token.text == "{") - (token.text == "}") for token in last[:-1])
+    if any(token.text == ";" and not depth for token, depth in zip(last, depths, strict=False)):
+        raise RefusedScript(
+            f"{path.name}:{last[0].line}: gmsh reads the first statement of this line only: put a line break at its end"
+        )
 
 
 def is_mesh(path: Path) -> bool:

@@ -39,8 +39,6 @@ def load_state(files: Sequence[Path], field: str, *, lines: bool = True) -> list
     lines: with streamlines in the plane, which change neither colours nor size.
     """
     meshes = [import_pyvista().read(path) for path in files]
-    if not is_flat(meshes[0]) and "fluid_fraction" in meshes[0].cell_data:
-        meshes = [mesh for mesh in meshes if not is_obstacle(mesh)]  # they would hide the flow
     meshes[0] = with_derived(meshes[0], field)
     flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
     parts = [part for mesh in meshes if mesh is not flow for part in _load_body(mesh, field)]
@@ -50,9 +48,10 @@ def load_state(files: Sequence[Path], field: str, *, lines: bool = True) -> list
         parts = [replace(part, values=None) for part in parts]
     if is_flat(flow):
         return [plane_flow(flow, field, lines=lines), *parts]
+    inside = [mesh for mesh in meshes[1:] if not (is_obstacle(mesh) or surrounds(mesh, flow))]
     # The edges of elements would hide the flow around a body.
-    bodies = [replace(part, edges=NO_LINES) for part in _opened(parts, flow)]
-    return _spatial_flow(flow, field, [mesh for mesh in meshes[1:] if not surrounds(mesh, flow)]) + bodies
+    bodies = [replace(part, edges=NO_LINES) for part in _behind(_opened(parts, flow), flow, inside)]
+    return _spatial_flow(flow, field, inside) + bodies
 
 
 def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
@@ -93,6 +92,24 @@ def _opened(parts: Sequence[DrawnBody], flow: Any) -> list[DrawnBody]:
             bounds[2 * axis + (ISOMETRIC[axis] > 0)] = flow.center[axis]
             half = part.surface.clip_box(bounds, invert=False)
             part = replace(part, surface=half.extract_surface(algorithm="dataset_surface"))
+        found.append(part)
+    return found
+
+
+def _behind(parts: Sequence[DrawnBody], flow: Any, bodies: Sequence[Any]) -> list[DrawnBody]:
+    """Of obstacles that reach out of the box what is in it behind the slice: the rest would hide the flow."""
+    normal, origin = slice_plane(flow, bodies)
+    axis, box = "xyz".index(normal), np.array(flow.bounds)
+    bounds = box.copy()
+    bounds[2 * axis + (ISOMETRIC[axis] > 0)] = origin[axis]
+    found = []
+    for part in parts:
+        low, high = np.array(part.surface.bounds).reshape(3, 2).T
+        if part.aside and not (np.all(low >= box[::2]) and np.all(high <= box[1::2])):
+            clipped = part.surface.clip_box(bounds, invert=False).extract_surface(algorithm="dataset_surface")
+            if not clipped.n_points:
+                continue
+            part = replace(part, surface=clipped)
         found.append(part)
     return found
 

@@ -42,6 +42,7 @@ from solvers.fem.pointwise import Pointwise, numbers_of_cells
 from solvers.fem.quadrature import Entities, cell_quadrature, facet_quadrature
 from solvers.fem.spaces import (
     block_points,
+    broken_space,
     cell_blocks,
     cellwise_space,
     component_cell_dofs,

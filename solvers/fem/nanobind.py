@@ -40,6 +40,11 @@ def discontinuous_element(cell: str, degree: int) -> Any:
     return basix.ufl.element(family, cell, degree)
 
 
+def broken_element(cell: str, degree: int) -> Any:
+    """The Lagrange element of scalars with nodes of its own in each cell."""
+    return basix.ufl.element("Lagrange", cell, degree, discontinuous=True)
+
+
 def mixed_element(elements: list[Any]) -> Any:
     """Several elements side by side."""
     return basix.ufl.mixed_element(elements)

@@ -35,6 +35,11 @@ def discontinuous_element(cell: str, degree: int) -> Any:
     return ufl.FiniteElement(family, cell, degree)
 
 
+def broken_element(cell: str, degree: int) -> Any:
+    """The Lagrange element of scalars with nodes of its own in each cell."""
+    return ufl.FiniteElement("DG" if cell in ("triangle", "tetrahedron") else "DQ", cell, degree)
+
+
 def mixed_element(elements: list[Any]) -> Any:
     """Several elements side by side."""
     return ufl.MixedElement(elements)

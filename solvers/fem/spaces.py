@@ -47,6 +47,12 @@ def pressure_space(domain: Domain) -> Any:
         return calls.function_space(domain.mesh, element)
 
 
+def broken_space(domain: Domain) -> Any:
+    """Scalars with values of their own at the nodes of each cell."""
+    with compiling("an element"):
+        return calls.function_space(domain.mesh, calls.broken_element(cell_of(domain), domain.degree))
+
+
 def flow_space(domain: Domain, velocity_degree: int) -> Any:
     """Velocity and pressure as one function with dim + 1 components, pressure last and of first degree.
 

@@ -12,7 +12,7 @@ __getattr__, __all__ = lazy_names(
         "elastic_constants": ["lame"],
         "materials": [
             *("CoupNeoHooke", "HolzapfelGasserOgden", "LinearElastic", "MooneyRivlin", "NeoHooke"),
-            *("StVenantKirchhoff", "Yeoh"),
+            *("Ogden", "StVenantKirchhoff", "Yeoh"),
         ],
         "relaxation": ["Branch"],
         "springs": ["Spring"],

@@ -22,7 +22,9 @@ from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
 from solvers.structure.elements import Displacement, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
-from solvers.structure.materials import Material, parameters
+from solvers.structure.materials import Material, Ogden, parameters
+from solvers.structure.pre_stretch import PreStretch, PreStretched, pre_stretch_tensor
+from solvers.structure.principal import ByPrincipalStretches, PrincipalStretches
 from solvers.structure.relaxation import Branch, Relaxing
 from solvers.structure.springs import Spring, Springs
 from solvers.structure.supports import Roller, Support, Symmetry
@@ -44,6 +46,7 @@ class Body:
         *,
         element: Formulation = "displacement",
         relaxing: Sequence[Branch] = (),
+        pre_stretch: Sequence[PreStretch] = (),
         supports: Sequence[Support | Symmetry | Roller] = (),
         springs: Sequence[Spring] = (),
         gravity: Sequence[Value] | None = None,  # [m/s^2]
@@ -69,7 +72,7 @@ class Body:
         self.stiffness_degree, self.mass_degree = CELL_TYPES[domain.cell_type].quadrature
         self.density = self._parameter(material.density)
         self.parameters = {k: self._parameter(p) for k, p in parameters(material).items()}
-        self.element = self._element(fem.volume_measure(domain, self.stiffness_degree), relaxing)
+        self.element = self._element(fem.volume_measure(domain, self.stiffness_degree), relaxing, pre_stretch)
         self._energy, self._internal, self._tangent, self._mass = self._compiled()
         self._tangent_assembly = BlockAssembly(self._tangent)
         self._force = fem.function(self.space)
@@ -124,13 +127,20 @@ class Body:
         cellwise.x.array[:] = value(fem.cell_midpoints(self.domain), 0.0)
         return cellwise
 
-    def _element(self, dx: ufl.Measure, relaxing: Sequence[Branch]) -> Element:
-        element: Element = Displacement(self.material, self.parameters)
+    def _element(self, dx: ufl.Measure, relaxing: Sequence[Branch], pre_stretch: Sequence[PreStretch]) -> Element:
+        law: Any = self.material
+        F, stretches = forms.deformation_gradient(self.u), None
+        G = pre_stretch_tensor(self.domain, pre_stretch) if pre_stretch else None
+        if isinstance(law, Ogden):
+            stretches = PrincipalStretches(self.domain, law, F if G is None else F * G, self.stiffness_degree)
+            law = stretches.law
+        law = law if G is None else PreStretched(law, G)
+        element: Element = Displacement(law, self.parameters)
         if self.formulation == "mixed":
-            element = Mixed(self.domain, self.u, self.material, self.parameters, dx)
-        if not relaxing:
-            return element
-        return Relaxing(element, self.domain, self.u, self.parameters, self.stiffness_degree, relaxing)
+            element = Mixed(self.domain, self.u, law, self.parameters, dx)
+        if relaxing:
+            element = Relaxing(element, self.domain, self.u, self.parameters, self.stiffness_degree, relaxing)
+        return element if stretches is None else ByPrincipalStretches(element, stretches)
 
     def _compiled(self) -> Sequence[Any]:
         """Energy, internal force, its tangent and the mass."""

@@ -96,3 +96,20 @@ def test_end_of_a_flag_in_a_plane_of_the_grid(tmp_path):
     """Twice the end crosses a plane in one iterate and not in the next: no step is repeated."""
     assert run_case(load_case(CASES / "thin_flag"), tmp_path) == 0
     assert json.loads((tmp_path / "summary.json").read_text())["steps"] == {"accepted": 100, "retried": 0}
+
+
+def test_wall_made_of_a_line(tmp_path):
+    """A line in a mesh file with a thickness is the same wall in the same flow."""
+    script = "Point(1) = {1.547, 0, 0}; Point(2) = {1.547, 1, 0}; Line(1) = {1, 2}; Transfinite Curve {1} = 11;\n"
+    (tmp_path / "line.geo").write_text(script)
+    soft = RUN | {"E": 1e4, "end": 0.2}
+    shape = history_of(tmp_path / "shape", **soft)
+    text = CASE.format(**soft)
+    old = "{shape: rectangle, size: [0.02, 1], cells: [1, 10], order: 2, origin: [1.537, 0]}"
+    assert old in text
+    text = text.replace(old, "{file: line.geo, thickness: 0.02, order: 2}").replace("[bottom, top]", "edge")
+    (tmp_path / "case.yaml").write_text(text)
+    assert run_case(load_case(tmp_path), tmp_path / "out") == 0
+    line = read_history(tmp_path / "out" / "history.csv")
+    for column in ("mid.x", "flow", "left", "right"):
+        assert line[column] == pytest.approx(shape[column], rel=1e-8, abs=1e-10)

@@ -197,7 +197,7 @@ def test_mistakes_in_the_code(tmp_path, code, message):
     ("material", "message"),
     [
         ("{law: 'laws.py'}", "8:23: 'law' must be FILE.py:NAME, not 'laws.py'"),
-        ("{law: gent}", "8:23: unknown law 'gent' (available: st_venant_kirchhoff, neo_hooke, coup_neo_hooke, "),
+        ("{law: blatz}", "8:23: unknown law 'blatz' (available: st_venant_kirchhoff, neo_hooke, coup_neo_hooke, "),
         ("{law: 'laws.py:Gent', mu: 1}", "8:39: unknown setting 'mu' (available: law, parameters, density, viscous)"),
     ],
 )

@@ -118,7 +118,7 @@ MISTAKES = [
         "law: neo_hooke, ",
         "",
         "9:17: 'material' needs the setting 'law' (available: st_venant_kirchhoff, neo_hooke, coup_neo_hooke, "
-        "mooney_rivlin, yeoh, holzapfel_gasser_ogden, FILE.py:NAME)",
+        "mooney_rivlin, yeoh, ogden, holzapfel_gasser_ogden, FILE.py:NAME)",
         "{E",
     ),
     ("rectangle", "blob", f"8:21: unknown shape 'blob' (available: {SHAPES})", "blob"),
@@ -323,7 +323,7 @@ def test_all_mistakes_at_once_in_the_order_of_lines():
         "  time: {step: 0, end: 1}\n"
         "               ^\n"
         "case.yaml:9:17: 'material' needs the setting 'law' (available: st_venant_kirchhoff, neo_hooke, "
-        "coup_neo_hooke, mooney_rivlin, yeoh, holzapfel_gasser_ogden, FILE.py:NAME)\n"
+        "coup_neo_hooke, mooney_rivlin, yeoh, ogden, holzapfel_gasser_ogden, FILE.py:NAME)\n"
         "        material: {lw: neo_hooke, E: 1e6, nu: 0.3, density: 1000}\n"
         "                  ^\n"
         "case.yaml:22:5: unknown setting 'max_iteration'; did you mean 'max_iterations'?\n"

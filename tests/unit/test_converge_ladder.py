@@ -119,7 +119,7 @@ Physical Surface("body") = {1}; Physical Curve("side") = {4};
 """
 
 
-@pytest.mark.parametrize("more", ["", "Transfinite Curve{:} = 41; Transfinite Surface{1}; Recombine Surface{1};"])
+@pytest.mark.parametrize("more", ["", "Transfinite Curve{:} = 41; Transfinite Surface{1}; Recombine Surface{1};\n"])
 def test_levels_of_a_script(plan, more):
     made = plan(BODY, part=SQUARE + more)
     near, far = made.coarser()

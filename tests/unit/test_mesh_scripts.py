@@ -90,3 +90,18 @@ Transfinite Curve {1:3} = n + 1; Physical Surface("Save") = {1};
     assert set(mesh.regions) == {"Save"}
     for path in Path(__file__).parents[2].glob("cases/*/*.geo"):
         require_harmless(path)
+
+
+def test_a_last_line_that_gmsh_does_not_read_whole(tmp_path):
+    """With one statement it does; a line break helps."""
+    script = tmp_path / "part.geo"
+    out = "Extrude {0, 0, 1} { Surface{1}; Layers{2}; };"
+    for end in ('Physical Surface("a") = {1};', "// a; b;", "a = 1; b = 2;\n", out):
+        script.write_text(TRIANGLE + end)
+        require_harmless(script)
+    script.write_text(TRIANGLE + 'Physical Curve("a") = {1}; Physical Surface("b") = {1};')
+    with pytest.raises(RefusedScript) as error:
+        require_harmless(script)
+    assert str(error.value) == (
+        "part.geo:3: gmsh reads the first statement of this line only: put a line break at its end"
+    )

@@ -6,6 +6,7 @@ from case_mistakes import load
 
 from fsci.builder.obstacles import obstacle_snapshots
 from fsci.plot.picture import largest_pressure, plot_run
+from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import load_state
 from fsci.plot.scene import AROUND, compose
 from fsci.running.output import FieldWriter, write_vtu
@@ -88,3 +89,23 @@ def test_an_obstacle_across_a_plane_of_symmetry_is_whole(tmp_path):
     assert [path.name for path in drawn] == ["displacement_0.png"]
     with pytest.raises(ValueError, match="a part lies on both sides"):
         plot_run(tmp_path, times=(0.0,), mirrors=("x=0.5",))
+
+
+def test_obstacles_in_a_flow_in_space_do_not_hide_it(tmp_path):
+    """A large floor: its part in the box, behind the slice. A stamp in the box is whole, one before it is not drawn."""
+    pyvista = import_pyvista()
+    box = pyvista.ImageData(dimensions=(5, 5, 5), spacing=(0.5, 0.25, 0.25)).cast_to_unstructured_grid()
+    box.point_data["velocity"] = np.tile([1.0, 0.0, 0.0], (box.n_points, 1))
+    box.cell_data["fluid_fraction"] = np.ones(box.n_cells)
+    box.save(tmp_path / "fluid.vtu")
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    places = {"floor": (10.0, [-4.0, -4.0, 0.3]), "stamp": (0.2, [0.5, 0.1, 0.5]), "near": (2.0, [0.0, -2.5, 0.5])}
+    for name, (size, start) in places.items():
+        points = size * SQUARE + start
+        points[2] += [0.0, 0.0, 1e-3 * size]  # else it would be a drawing in a plane
+        write_vtu(tmp_path / f"{name}.vtu", Snapshot(name, points, triangles, "triangle", {}))
+    state = load_state([tmp_path / f"{name}.vtu" for name in ("fluid", *places)], "velocity")
+    floor, stamp = [part.surface for part in state if part.aside]
+    assert floor.bounds[:4] == pytest.approx([0.0, 2.0, 0.5, 1.0], abs=1e-5)
+    assert stamp.bounds[:4] == pytest.approx([0.5, 0.7, 0.1, 0.3])
+    assert compose([state], "velocity", "", UNITS_OF_CASE).view.half_height > 0.0

@@ -6,5 +6,6 @@ from solvers.structure.materials.linear_elastic import LinearElastic, PlaneStres
 from solvers.structure.materials.material import Material, Tensor, in_space, parameters
 from solvers.structure.materials.mooney_rivlin import MooneyRivlin
 from solvers.structure.materials.neo_hooke import NeoHooke
+from solvers.structure.materials.ogden import Ogden
 from solvers.structure.materials.st_venant_kirchhoff import PlaneStressStVenantKirchhoff, StVenantKirchhoff
 from solvers.structure.materials.yeoh import Yeoh

@@ -52,8 +52,9 @@ class Material(Protocol):
 
 
 def parameters(material: Material) -> dict[str, Value]:
-    """The parameters of the energy by name."""
-    return {f.name: getattr(material, f.name) for f in fields(material) if f.name != "density"}  # type: ignore[arg-type]
+    """The parameters of the energy in UFL by name."""
+    others = ("density", "terms")
+    return {f.name: getattr(material, f.name) for f in fields(material) if f.name not in others}  # type: ignore[arg-type]
 
 
 def in_space(F: Tensor) -> Tensor:
