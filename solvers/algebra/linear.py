@@ -177,7 +177,7 @@ def choose_flow(
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
-    if sheets:
+    if sheets and method != "iterative":
         return ("direct",) if degree > 1 else ("ilu", "fill", "direct")
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
