@@ -65,7 +65,6 @@ def discretise(
         unknowns.counted(),
         degree=settings.degree,
         steady=settings.steady,
-        sheets=sheets is not None,
         with_solids=any(body.deforms for body in bodies),
         rough=is_rough(grid, convection=settings.convection),
     )
