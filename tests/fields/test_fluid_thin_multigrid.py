@@ -113,7 +113,7 @@ def test_as_many_iterations_as_around_a_thick_plate(element, count, end, cells, 
 @pytest.mark.slow
 @pytest.mark.parametrize(("element", "count"), [("q1q1", 24), ("q1q1", 32), ("q2q1", 16)])
 def test_iterations_around_thin_plates_in_many_cells(element, count):
-    """Up to 280,000 unknowns; thin ones take 1.5 times the iterations of thick ones at most, in the same flow in time."""
+    """Up to 280,000 unknowns, one step in time."""
     counts = [
         first_system(channel_with_plate(equal_cells(count), 1 / count, thickness, element=element, dt=0.01))[1]
         for thickness in (0.2, 2.0)

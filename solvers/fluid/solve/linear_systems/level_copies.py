@@ -84,9 +84,7 @@ def vertices(sheets: Sheets, nested: Nested | None) -> LevelCopies:
     further = np.arange(size, count)
     places = sheets.on_lattice(further, 1)
     order = np.argsort(further * size + places)
-    return LevelCopies(
-        size, places, _incidence(nodes, count), parted, (further * size + places)[order], further[order]
-    )
+    return LevelCopies(size, places, _incidence(nodes, count), parted, (further * size + places)[order], further[order])
 
 
 def second_degree(sheets: Sheets) -> LevelCopies:
