@@ -17,6 +17,7 @@ from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 
+SLOW = pytest.mark.slow
 SEALS, OPEN = 1.6, 0.13  #: where a plate ends
 
 
@@ -94,7 +95,7 @@ def test_no_coarse_node_has_both_sides(element, count, cells):
 @pytest.mark.parametrize("end", [SEALS, OPEN])
 @pytest.mark.parametrize(
     ("element", "count", "dt"),
-    [("q1q1", 10, None), ("q1q1", 10, 0.01), ("q2q1", 6, None), pytest.param("q2q1", 6, 0.01, marks=pytest.mark.slow)],
+    [("q1q1", 10, None), ("q1q1", 10, 0.01), ("q2q1", 6, None), pytest.param("q2q1", 6, 0.01, marks=SLOW)],
 )
 def test_as_many_iterations_as_around_a_thick_plate(element, count, end, cells, dt):
     """And the solution of the direct solver."""
@@ -110,7 +111,7 @@ def test_as_many_iterations_as_around_a_thick_plate(element, count, end, cells, 
     assert found[0.2][1] <= 1.5 * found[2.0][1]
 
 
-@pytest.mark.slow
+@SLOW
 @pytest.mark.parametrize(("element", "count"), [("q1q1", 24), ("q1q1", 32), ("q2q1", 16)])
 def test_iterations_around_thin_plates_in_many_cells(element, count):
     """Up to 280,000 unknowns, one step in time."""
@@ -121,7 +122,7 @@ def test_iterations_around_thin_plates_in_many_cells(element, count):
     assert counts[0] <= 1.5 * counts[1]
 
 
-@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=SLOW)])
 def test_plate_that_is_pushed_through_a_duct_with_multigrid(element):
     """Cells and copies follow it; the fluid moves with it, and it carries the difference of the pressures."""
     grid, speed = uniform([0, 0, 0], [4.0, 1.0, 1.0], [16, 4, 4]), np.array([0.5, 0.0, 0.0])
@@ -142,23 +143,36 @@ def test_plate_that_is_pushed_through_a_duct_with_multigrid(element):
         assert fluid.iterate.solver.sequence.multigrid
 
 
-@pytest.mark.parametrize("processes", [2, pytest.param(3, marks=pytest.mark.slow)])
-def test_multigrid_around_thin_plates_on_processes(processes):
-    """The same forces as on one, in equal and nested cells, with both elements."""
-    on_processes(processes, __file__)
+@pytest.mark.parametrize(
+    ("processes", "element", "count"),
+    [(2, "q1q1", 8), pytest.param(3, "q1q1", 8, marks=SLOW), pytest.param(2, "q2q1", 6, marks=SLOW)],
+)
+def test_multigrid_around_thin_plates_on_processes(processes, element, count):
+    """The same forces as on one, in equal and nested cells; each process has a block of equal cells, on both sides."""
+    on_processes(processes, __file__, element, count)
+
+
+def main(element, count):
+    for cells in (equal_cells, nested_cells):
+        forces = []
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+            fluid = channel_with_plate(cells(count), 1 / count, 0.2, OPEN, element=element, comm=comm)
+            _, iterations = first_system(fluid)
+            fluid.residual()
+            forces.append((fluid.force()["plate"].sum(axis=0), iterations))
+            assert fluid.iterate.solver.sequence.current == "multigrid"
+            assert fluid.grid.sheets is not None
+        (force, many), (alone, few) = forces
+        assert np.abs(force - alone).max() < 1e-7 * np.abs(alone).max(), (force, alone)
+        assert many <= few + 6, (many, few)
+        if cells is equal_cells:
+            fluid = channel_with_plate(cells(count), 1 / count, 0.2, OPEN, element=element, comm=MPI.COMM_WORLD)
+            grid, sheets, local = fluid.grid.grid, fluid.grid.sheets, fluid.grid.in_sheets[: fluid.grid.owned]
+            index = np.stack(np.unravel_index(local[local < grid.size], grid.shape, order="F"))
+            assert np.prod(index.max(axis=1) - index.min(axis=1) + 1) == np.count_nonzero(local < grid.size)
+            with_fluid = (local >= grid.size) & (local < grid.size + sheets.singles)
+            assert np.isin(sheets.box_cells(local[with_fluid]), local).all()
 
 
 if __name__ == "__main__":
-    for cells in (equal_cells, nested_cells):
-        for element, count in (("q1q1", 8), ("q2q1", 6)):
-            forces = []
-            for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
-                fluid = channel_with_plate(cells(count), 1 / count, 0.2, OPEN, element=element, comm=comm)
-                _, iterations = first_system(fluid)
-                fluid.residual()
-                forces.append((fluid.force()["plate"].sum(axis=0), iterations))
-                assert fluid.iterate.solver.sequence.current == "multigrid"
-            (force, many), (alone, few) = forces
-            assert np.abs(force - alone).max() < 1e-7 * np.abs(alone).max(), (force, alone)
-            assert many <= few + 6, (many, few)
-    sys.exit(0)
+    main(sys.argv[1], int(sys.argv[2]))
