@@ -163,22 +163,18 @@ def choose_flow(
     *,
     degree: int,
     steady: bool,
-    sheets: bool = False,
     with_solids: bool = False,
     rough: bool = False,
 ) -> tuple[FlowMethod, ...]:
     """The sequence of solvers for a flow: each is used when those before it have failed.
 
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
-    sheets: there are several nodes in one place, which the coarse lattices of multigrid do not have; incomplete factors
-    of second degree mostly stall there. smoothed: multigrid with stronger smoothers, which second degree always has.
+    smoothed: multigrid with stronger smoothers, which second degree always has.
     with_solids: equations of elastic bodies may belong to the system. rough: single steps of smoothers diverge in
     steady flow, as on stretched cells.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
-    if sheets:
-        return ("direct",) if degree > 1 else ("ilu", "fill", "direct")
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
         return ("ilu", "multigrid", "direct") if degree > 1 else ("ilu", "multigrid", "smoothed", "direct")

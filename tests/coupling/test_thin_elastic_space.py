@@ -87,3 +87,26 @@ def test_leaflet_that_bends(tmp_path):
     assert history["tip.x"][-1] > 0.04
     assert np.abs(history["fluid.mass"]).max() < 1e-9
     assert np.abs(history["interface.momentum"]).max() < 1e-8
+
+
+def test_leaf_with_multigrid(tmp_path):
+    """It bends as with the direct solver, with at most one more Newton step per step; multigrid does not stall."""
+    (tmp_path / "case.yaml").write_text(LEAF)
+    found = {}
+    for method in ("iterative", "direct"):
+        words = (
+            "--set",
+            f"solver.linear.method={method}",
+            "--set",
+            "solver.linear.tolerance=1e-9",
+            "--set",
+            "time.end=0.05",
+        )
+        done = fsci("run", tmp_path, "-o", tmp_path / method, *words)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "from here on" not in done.stdout
+        found[method] = read_history(tmp_path / method / "history.csv")
+    for column in ("tip.x", "tip.z"):
+        with_multigrid, exact = (history[column] for history in found.values())
+        assert np.abs(with_multigrid - exact).max() < 1e-6 * np.abs(exact).max()
+    assert (found["iterative"]["iterations"] <= found["direct"]["iterations"] + 1).all()

@@ -144,11 +144,13 @@ class Unknowns:
         return int(self.index_map.size_global) * self.block_size
 
     def counted(self) -> int:
-        """Dofs on all processes; on nested cells without those of hanging nodes (collective)."""
-        if self.hanging is None:
-            return self.size()
+        """Dofs of nodes on all processes, without hanging ones (collective).
+
+        Joined nodes leave further dofs that belong to no cell.
+        """
         dofs = np.concatenate([nodes.dofs[: nodes.owned].ravel() for nodes in (self.velocity, self.pressure)])
-        return int(self.grid.comm.allreduce(int(np.count_nonzero(~self.hanging.dofs[dofs]))))
+        free = len(dofs) if self.hanging is None else int(np.count_nonzero(~self.hanging.dofs[dofs]))
+        return int(self.grid.comm.allreduce(free))
 
     def share(self, function) -> None:
         """Update values at hanging nodes and ghosts from the owned unknowns (collective)."""

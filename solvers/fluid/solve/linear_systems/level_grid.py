@@ -7,7 +7,7 @@ them, on nested cells with those of hanging nodes: the interpolation is continuo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy import sparse
 from solvers.api import Array, Indices
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.grid.nested import Nested
+from solvers.fluid.solve.linear_systems.level_copies import LevelCopies, coarser_copies
 
 #: A level has at most this share of the nodes of the next finer one.
 THINNER = 0.6
@@ -29,14 +30,30 @@ class LevelGrid:
     planes: tuple[Array, ...]
     periodic: tuple[int, ...]
     nested: Nested | None = None  #: the cells, if not all are cells of the lattice
+    copies: LevelCopies | None = None  #: of nodes around thin bodies
 
     @property
     def shape(self) -> tuple[int, ...]:
         return tuple(len(some) - (axis in self.periodic) for axis, some in enumerate(self.planes))
 
+    @property
+    def size(self) -> int:
+        """Nodes of the lattice, without copies."""
+        return int(np.prod(self.shape))
+
+    @property
+    def count(self) -> int:
+        """Nodes with copies."""
+        return self.size + (0 if self.copies is None else len(self.copies.further))
+
     def numbers(self, nodes: Indices) -> Indices:
         """Numbers of nodes, given the indices of their planes, shape (nodes, dim)."""
         return np.ravel_multi_index(tuple(nodes.T), self.shape, order="F").astype(np.int64)
+
+    def indices(self, numbers: Indices) -> Indices:
+        """Indices of the planes of nodes, given their numbers, shape (nodes, dim)."""
+        places = numbers if self.copies is None else self.copies.places[numbers]
+        return np.stack(np.unravel_index(places, self.shape, order="F"), axis=1)
 
     def points(self, nodes: Indices) -> Array:
         """Positions [m] of the same, shape (nodes, dim)."""
@@ -55,6 +72,13 @@ class LevelGrid:
         A pair is merged if the new cell is no wider than H, which is the same for all directions. Hence stretched cells
         are merged across their short edges first. H is doubled until at most the share THINNER of the nodes remains.
         """
+        found = self._coarser()
+        if self.copies is None:
+            return found
+        entries = found.interpolation(self.points(self.indices(np.arange(self.size))))
+        return replace(found, copies=coarser_copies(self.copies, entries, found.size))
+
+    def _coarser(self) -> LevelGrid:
         if self.nested is not None:
             grid: Grid = self.nested.coarser()
             return LevelGrid(grid.edges, self.periodic, grid if isinstance(grid, Nested) else None)

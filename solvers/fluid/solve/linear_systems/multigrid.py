@@ -9,7 +9,7 @@ Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 an
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -22,6 +22,7 @@ from solvers.api import Indices
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.solve.linear_systems.coarse_matrix import CoarseMatrix
 from solvers.fluid.solve.linear_systems.decoupled import decoupled
+from solvers.fluid.solve.linear_systems.level_copies import from_second_degree, second_degree, vertices
 from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
 from solvers.fluid.solve.linear_systems.near_smoother import NearSmoother
 
@@ -37,12 +38,13 @@ class Component:
     """Owned nodes of one velocity component, or of the pressure, on one level."""
 
     lattice: LevelGrid
-    nodes: Indices  #: indices of their planes, shape (owned, dim)
+    numbers: Indices  #: on this level, shape (owned,)
     dofs: Indices  #: their global unknowns, shape (owned,)
 
     @property
-    def numbers(self) -> Indices:
-        return self.lattice.numbers(self.nodes)
+    def nodes(self) -> Indices:
+        """Indices of their planes, shape (owned, dim)."""
+        return self.lattice.indices(self.numbers)
 
 
 @dataclass(frozen=True)
@@ -63,15 +65,18 @@ class Level:
 
 def finest(unknowns: Unknowns) -> Level:
     """The finest level: the unknowns of the flow."""
-    found = []
+    found: list[Component] = []
+    grid = unknowns.grid
+    corners = None if grid.sheets is None else vertices(grid.sheets, grid.nested)
     for nodes, degree in ((unknowns.velocity, unknowns.degree), (unknowns.pressure, 1)):
+        copies = corners if grid.sheets is None or degree == 1 else second_degree(grid.sheets)
         planes = tuple(
             np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
-            for edge in unknowns.grid.grid.edges
+            for edge in grid.grid.edges
         )
-        lattice = LevelGrid(planes, unknowns.periodic, unknowns.grid.nested if degree == 1 else None)
-        index = np.stack(np.unravel_index(nodes.numbers[: nodes.owned], lattice.shape, order="F"), axis=1)
-        found += [Component(lattice, index, unknowns.global_dofs[dofs]) for dofs in nodes.dofs[: nodes.owned].T]
+        lattice = LevelGrid(planes, unknowns.periodic, grid.nested if degree == 1 else None, copies)
+        numbers = nodes.numbers[: nodes.owned]
+        found += [Component(lattice, numbers, unknowns.global_dofs[dofs]) for dofs in nodes.dofs[: nodes.owned].T]
     return Level(found, int(unknowns.index_map.local_range[0]) * unknowns.block_size, unknowns.owned)
 
 
@@ -83,19 +88,25 @@ def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level
     """
     kept, points = [], []
     for component, lattice in zip(fine.components, lattices, strict=True):
-        nodes, own = np.empty_like(component.nodes), np.ones(len(component.nodes), dtype=bool)
+        numbers = component.numbers[component.numbers < component.lattice.size]
+        finer = component.lattice.indices(numbers)
+        nodes, own = np.empty_like(finer), np.ones(len(finer), dtype=bool)
         for axis, (some, every) in enumerate(zip(lattice.planes, component.lattice.planes, strict=True)):
-            coordinate = every[component.nodes[:, axis]]
+            coordinate = every[finer[:, axis]]
             nodes[:, axis] = np.searchsorted(some, coordinate)
             own &= some[nodes[:, axis]] == coordinate
         own[own] = lattice.has(nodes[own])
-        kept.append(nodes[own])
-        points.append(lattice.points(nodes[own]))
+        numbers = lattice.numbers(nodes[own])
+        if lattice.copies is not None:
+            further = np.flatnonzero(np.isin(lattice.copies.lowest, component.numbers))
+            numbers = np.concatenate([numbers, lattice.size + further])
+        kept.append(numbers)
+        points.append(lattice.points(lattice.indices(numbers)))
     every = np.concatenate(points)
     number = np.empty(len(every), dtype=np.int64)
-    number[np.lexsort(every.T)] = np.arange(len(every))
+    number[np.lexsort((np.concatenate(kept), *every.T))] = np.arange(len(every))  # copies in one place, one by one
     start = comm.exscan(len(every)) or 0  # type: ignore[attr-defined]
-    parts = np.split(start + number, np.cumsum([len(nodes) for nodes in kept])[:-1])
+    parts = np.split(start + number, np.cumsum([len(numbers) for numbers in kept])[:-1])
     components = [Component(*part) for part in zip(lattices, kept, parts, strict=True)]
     return Level(components, start, len(every))
 
@@ -106,7 +117,12 @@ def interpolation(comm: MPI.Comm, fine: Level, coarse: Level) -> PETSc.Mat:
     for here, there in zip(fine.components, coarse.components, strict=True):
         unknown = _everywhere(comm, there)
         nodes, parents, weights = there.lattice.interpolation(here.lattice.points(here.nodes))
-        rows.append(here.dofs[nodes] - fine.start)
+        dofs = here.dofs[nodes]
+        if there.lattice.copies is not None:
+            finer, parents, weights = there.lattice.copies.parents(here.numbers[nodes], parents, weights)
+            order = np.argsort(here.numbers)
+            dofs = here.dofs[order[np.searchsorted(here.numbers, finer, sorter=order)]]
+        rows.append(dofs - fine.start)
         columns.append(unknown[parents])
         data.append(weights)
     entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
@@ -117,7 +133,7 @@ def interpolation(comm: MPI.Comm, fine: Level, coarse: Level) -> PETSc.Mat:
 
 def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
     """Global unknown of every node of a coarse lattice (collective)."""
-    found = np.zeros(int(np.prod(component.lattice.shape)), dtype=np.int64)
+    found = np.zeros(component.lattice.count, dtype=np.int64)
     found[component.numbers] = component.dofs
     return found if comm.size == 1 else comm.allreduce(found)
 
@@ -149,7 +165,11 @@ class Multigrid:
                 break
             finer_velocity = lattices[0].shape != lattices[-1].shape
             next_one = lattices[-1] if finer_velocity else lattices[-1].coarser()
-            self.levels.append(coarsen(comm, self.levels[-1], [next_one] * len(lattices)))
+            of_velocity = next_one
+            if finer_velocity and (sheets := unknowns.grid.sheets) is not None and next_one.copies is not None:
+                of_velocity = replace(next_one, copies=from_second_degree(sheets, next_one.copies))
+            lattices = [*[of_velocity] * unknowns.dim, next_one]
+            self.levels.append(coarsen(comm, self.levels[-1], lattices))
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
     def preconditioner(
