@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from solvers.contact.law.law import OPEN, SLIP, STICK, Statuses
 
-#: Quasi-static problems with much friction have no solution in places: a node slips if it sticks and sticks if it slips.
+#: Quasi-static problems with much friction may have no solution: a node slips if it sticks and sticks if it slips.
 #: Source: Klarbring, Ingenieur-Archiv 60 (1990) 529-541.
 WEDGED = "; it sticks and slips in turn: with this much friction an edge may wedge, and no forces balance; take less"
 
