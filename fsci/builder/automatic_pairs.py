@@ -17,16 +17,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.elements import lame_at_cells
 from fsci.builder.facing import Face, face, faces, meeting
 from fsci.builder.on_first import shared
 from fsci.case import Case
 from fsci.case.contact import Friction, PairSection, Side
-from fsci.case.material import OwnLawSection
 from fsci.case.supports import SupportSection
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from solvers.mesh.mesh import Mesh
-from solvers.structure.elastic_constants import lambda_of_bulk, young
-from solvers.values import combine, evaluate
+from solvers.structure.elastic_constants import young
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -178,11 +177,4 @@ def holds(support: SupportSection, face: Face) -> bool:
 
 def mean_stiffness(case: Case, body: str, mesh: Mesh) -> float:
     """The mean of Young's modulus [Pa] in the middles of all cells of a body, for small strains. Raises CaseError."""
-    middles = mesh.points[mesh.cells].mean(axis=1).T
-    material = case.elastic_bodies[body].material
-    if isinstance(material, OwnLawSection):
-        from fsci.builder.own_law import own_law_at_rest
-
-        at_rest = own_law_at_rest(case, body, middles)
-        return young(at_rest.mu, lambda_of_bulk(at_rest.mu, at_rest.bulk))
-    return float(np.mean(evaluate(combine(young, *material.lame), middles, 0.0)))
+    return float(np.mean(young(*lame_at_cells(case, body, mesh))))

@@ -77,7 +77,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         probes=build_probes(case, "structure", STRUCTURE_PROBES, structure),
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
-        notes=_notes(bodies),
+        notes=_notes(case, bodies),
         sentinels={
             **_of_bodies(case, comm, structure, contact),
             "energy": structure.energy_sentinel,
@@ -128,7 +128,7 @@ def _structure_and_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation
         probes=joined(probes),
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs(), "rigid": rigid.unknowns},
-        notes=_notes(bodies),
+        notes=_notes(case, bodies),
         sentinels={
             **build_sentinels(case, comm, structure=structure, contact=contact, rigid=rigid),
             "energy": structure.energy_sentinel,
@@ -219,7 +219,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error, **watched.numbers(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()}
         | ({} if rigid is None else {"rigid": rigid.unknowns}),
-        notes=_notes(bodies),
+        notes=_notes(case, bodies),
         sentinels={
             **build_sentinels(case, comm, structure=structure, contact=contact, rigid=rigid, given=fluid.bodies),
             **watched.sentinels,
@@ -294,6 +294,11 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     )
 
 
-def _notes(bodies: list[Body]) -> list[str]:
-    meshes = [(body.name, body.domain.source) for body in bodies]
-    return [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes if mesh is not None and mesh.note]
+def _notes(case: Case, bodies: list[Body]) -> list[str]:
+    from fsci.builder.elements import element_note, locking_warning
+
+    meshes = {body.name: body.domain.source for body in bodies if body.domain.source is not None}
+    notes = [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes.items() if mesh.note]
+    notes += [f"body '{name}': {note}" for name, mesh in meshes.items() if (note := element_note(case, name, mesh))]
+    locking = [(name, locking_warning(case, name, mesh)) for name, mesh in meshes.items()]
+    return notes + [f"warning: body '{name}': {words}" for name, words in locking if words]

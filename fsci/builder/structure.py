@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fsci.builder.closed_parts import closed_parts
 from fsci.builder.columns import Table
+from fsci.builder.elements import choose_element
 from fsci.builder.loads import build_loads
 from fsci.builder.named import named
 from fsci.builder.point_springs import point_springs
@@ -27,6 +28,7 @@ from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
 from solvers.structure.body import Body
 from solvers.structure.elastic_constants import plane_stress_lambda
+from solvers.structure.elements import Formulation
 from solvers.structure.field import Structure
 from solvers.structure.materials import (
     LinearElastic,
@@ -48,8 +50,8 @@ if TYPE_CHECKING:
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
     """The elastic bodies of a case. Raises CaseError (collective)."""
-    meshes, locations = _meshes(case, comm)
-    return [_body(case, name, comm, meshes.get(name), locations[name]) for name in case.elastic_bodies]
+    meshes, locations, elements = _meshes(case, comm)
+    return [_body(case, name, comm, meshes.get(name), locations[name], elements[name]) for name in case.elastic_bodies]
 
 
 def build_structure(
@@ -83,24 +85,25 @@ def _time_scheme(case: Case) -> TimeScheme:
     return Statics() if dynamics is None else dynamics.time_scheme()
 
 
-def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: Locations) -> Body:
-    assert case.structure is not None
+def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: Locations, element: Formulation) -> Body:
     settings = case.elastic_bodies[name]
     vectors = {key: getattr(settings, key) for key in VECTORS}
     material = _material(case, name)
     loads = build_loads(settings, locations)
     relaxing = [Branch(part.share, part.time) for part in settings.material.viscous]
-    return Body(name, mesh, material, element=settings.element, relaxing=relaxing, **loads, **vectors, comm=comm)
+    return Body(name, mesh, material, element=element, relaxing=relaxing, **loads, **vectors, comm=comm)
 
 
-def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Locations]]:
-    """The meshes of the bodies on rank 0, with all surfaces that the case names; on all processes the loaded parts."""
-    error, meshes, locations = None, {}, {}
+def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Locations], dict[str, Formulation]]:
+    """The meshes of the bodies on rank 0, with all surfaces that the case names; on all processes the loaded parts and
+    the elements."""
+    error, meshes, locations, elements = None, {}, {}, {}
     if comm.rank == 0:
         try:
             meshes = {name: read_body(case, name) for name in case.elastic_bodies}
             locations = {name: find_locations(case, name, mesh) for name, mesh in meshes.items()}
             _require_own_laws(case, meshes)
+            elements = {name: choose_element(case, name, mesh) for name, mesh in meshes.items()}
             if case.contact is not None:
                 from fsci.builder.adjust import adjusted
                 from fsci.builder.tied import join_tied
@@ -108,10 +111,10 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
                 meshes = join_tied(case, adjusted(case, meshes))
         except Exception as raised:  # raised on every process below
             error = raised
-    error, locations = comm.bcast((error, locations), root=0)
+    error, locations, elements = comm.bcast((error, locations, elements), root=0)
     if error is not None:
         raise error
-    return meshes, locations
+    return meshes, locations, elements
 
 
 def _require_own_laws(case: Case, meshes: Mapping[str, Mesh]) -> None:

@@ -7,20 +7,15 @@ from collections.abc import Iterator
 from fsci.case.case import Case
 from fsci.case.jumps import jump_warnings
 from fsci.case.material import MaterialSection, OwnLawSection
-from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import flow_warnings, in_si
 from fsci.case.plausible_gravity import gravity_warnings
 from fsci.case.shapes import ShapeSection
-from fsci.case.structure import BodySection
 from fsci.case.yaml_text import Keys
 from fsci.distinct import distinct
-from solvers.structure.elastic_constants import poisson, young
+from solvers.structure.elastic_constants import young
 
 SOLID_DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
 STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamond, with a margin
-
-#: Poisson's ratio from which on the error of first-order cells in bending is more than twice that at 0.3.
-LOCKING = 0.45
 
 
 def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
@@ -32,7 +27,6 @@ def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
     for name, body in case.elastic_bodies.items():
         keys: Keys = ("structure", "bodies", name)
         yield from _material(case, body.material, (*keys, "material"))
-        yield from _locking(body, (*keys, "mesh"))
         if isinstance(body.mesh, ShapeSection) and (ratio := body.mesh.plan.aspect) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
     yield from jump_warnings(case)
@@ -46,22 +40,6 @@ def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
     if case.fluid is not None:
         yield from flow_warnings(case, case.fluid)
         yield from gravity_warnings(case, case.fluid)
-
-
-def _locking(body: BodySection, keys: Keys) -> Iterator[tuple[Keys, str]]:
-    constants = _constants(body.material)
-    if constants is None or body.element == "mixed" or body.mesh.order > 1 or _order_from_file(body.mesh):
-        return
-    nu = poisson(*constants)
-    if nu < LOCKING:
-        return
-    simplices = isinstance(body.mesh, ShapeSection) and body.mesh.cell in ("tri", "tet")
-    remedy = "'order: 2'" if simplices else "'element: mixed' or 'order: 2'"
-    yield keys, f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); take {remedy}"
-
-
-def _order_from_file(mesh: object) -> bool:
-    return isinstance(mesh, FileMesh) and not mesh.file.endswith(".geo")
 
 
 def _material(case: Case, material: MaterialSection, keys: Keys) -> Iterator[tuple[Keys, str]]:

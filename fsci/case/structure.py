@@ -104,10 +104,11 @@ class BodySection(Section):
     mesh: Mesh = setting(..., "mesh file or built-in shape")
     region: Text | None = setting(None, "name of the group of cells in the mesh file that is the body")
     material: Material = setting(..., "hyperelastic law")
-    element: Literal["displacement", "mixed"] = setting(
-        "displacement",
+    element: Literal["auto", "displacement", "mixed"] = setting(
+        "auto",
         "mixed: volume ratio and pressure are constant (order 1) or linear (order 2) in each cell, which does not lock "
-        "where the volume hardly changes; quadrilaterals and hexahedra only",
+        "where the volume hardly changes; quadrilaterals and hexahedra only; auto: mixed there if Poisson's ratio is "
+        "0.45 or more anywhere, in plane stress displacement",
     )
     kinematics: Literal["finite", "linear"] = setting(
         "finite", "linear: small displacements, Hooke's law with the constants of the material at small strain"

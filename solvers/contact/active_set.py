@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.contact.law.law import OPEN, STICK, Statuses
+from solvers.contact.law.law import OPEN, SLIP, STICK, Statuses
+
+#: Quasi-static problems with much friction may have no solution: a node slips if it sticks and sticks if it slips.
+#: Source: Klarbring, Ingenieur-Archiv 60 (1990) 529-541.
+WEDGED = "; it sticks and slips in turn: with this much friction an edge may wedge, and no forces balance; take less"
 
 
 class ActiveSet:
@@ -21,6 +25,7 @@ class ActiveSet:
         self.changed = False  #: whether the latest choice changed the set
         self.changes = 0  #: count of choices in this step that changed the set
         self.alternating = 0  #: nodes whose status changed when an earlier set came back in this step; 0: none did
+        self.wedged = False  #: whether one of them was stuck and slipped in turn
         self.tried = np.zeros(size, dtype=bool)  #: mask of the multipliers that were in contact in this solve
         self.stuck = np.zeros(size, dtype=bool)  #: mask of the multipliers that stuck in this solve
         self._earlier: set[bytes] = set()
@@ -37,7 +42,7 @@ class ActiveSet:
 
     def begin_solve(self) -> None:
         """Discard the earlier sets, which other loads may have chosen."""
-        self.alternating, self._earlier = 0, {self.status.tobytes()}
+        self.alternating, self.wedged, self._earlier = 0, False, {self.status.tobytes()}
         self.tried, self.stuck = self.active, np.zeros_like(self.stuck)
 
     def choose(self, status: Statuses) -> None:
@@ -49,6 +54,7 @@ class ActiveSet:
             chosen = status.tobytes()
             if chosen in self._earlier:
                 self.alternating = different
+                self.wedged |= bool((np.minimum(status, self.status)[status != self.status] == SLIP).any())
             self._earlier.add(chosen)
         self.status = status.copy()
         self.tried, self.stuck = self.tried | self.active, self.stuck | (status == STICK)
@@ -58,4 +64,5 @@ class ActiveSet:
         if self.alternating == 0:
             return ""
         nodes = "1 node changes its" if self.alternating == 1 else f"{self.alternating} nodes change their"
-        return f"the active set cycles: {nodes} status again and again"
+        cycles = f"the active set cycles: {nodes} status again and again"
+        return cycles + WEDGED if self.wedged else cycles

@@ -7,7 +7,7 @@ from contact_setup import make_body, make_contact, solve_step
 from fsci import shapes
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.law.frictionless import Frictionless
-from solvers.contact.law.law import Point
+from solvers.contact.law.law import OPEN, SLIP, STICK, Point
 from solvers.contact.surface import Surface
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -84,6 +84,21 @@ def test_going_in_circles_is_reported():
     assert active_set.cycle() == ""
     flip(active_set, 100)
     assert active_set.cycle() == "the active set cycles: 2 nodes change their status again and again"
+
+
+@pytest.mark.parametrize(("second", "wedges"), [(STICK, True), (OPEN, False)])
+def test_nodes_that_stick_and_slip_in_turn(second, wedges):
+    """Nodes that open in turn are no wedge."""
+    active_set = ActiveSet(2)
+    active_set.begin_step()
+    for status in ([SLIP, STICK], [second, STICK]) * 2:
+        active_set.choose(np.array(status, dtype=np.int8))
+    cycles = "the active set cycles: 1 node changes its status again and again"
+    words = "; it sticks and slips in turn: with this much friction an edge may wedge, and no forces balance; take less"
+    assert active_set.cycle() == cycles + words * wedges
+    active_set.begin_step()
+    active_set.choose(np.array([OPEN, STICK], dtype=np.int8))
+    assert active_set.cycle() == ""
 
 
 def test_a_new_step_forgets_the_circles():

@@ -305,7 +305,6 @@ def test_flow_around_a_nearly_incompressible_flap(tmp_path):
     for scheme in ("monolithic", "partitioned"):
         changes = (
             f"coupling.scheme={scheme}",
-            "structure.bodies.flap.element=mixed",
             "structure.bodies.flap.material.nu=0.4999",
             "time.end=0.03",
             "verify=[]",

@@ -212,7 +212,9 @@ def test_check_warns_of_a_stress_without_strain(tmp_path):
     [warning] = found.warnings
     assert warning.endswith("'Pressed' gives a stress of 3 Pa in the undeformed body 'cube'")
     found = check_meshes(
-        load_case(folder_of(tmp_path, "{law: 'laws.py:Yeoh', parameters: {c10: 1, c20: 1, bulk: 1e6}}"), trust=True)
+        load_case(
+            folder_of(tmp_path, "{law: 'laws.py:Yeoh', parameters: {c10: 1, c20: 1, bulk: 1e6}}", "auto"), trust=True
+        )
     )
     assert found.warnings == []
 

@@ -1,14 +1,20 @@
 """The linear solvers that `auto` tries near contact: incomplete factors where they are good, else the direct solver."""
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 from pressed_block import assert_same_results, press_block
+from structure_setup import load_step, make_structure, vector
 
 from fsci import shapes
 from solvers.algebra.solid_factors import SolidFactors
+from solvers.api import StepFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure import solid_solver
+from solvers.structure.body import Support, Traction
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
 
 COMM = MPI.COMM_SELF
 
@@ -82,8 +88,34 @@ def test_sequence_by_size():
         return solid_solver.choose(method, dim, dofs, contact=contact)
 
     assert choose("auto", 3, 30_000) == ("ilu", "direct")
-    assert choose("auto", 3, 30_001) == ("ilu", "iterative")
+    assert choose("auto", 3, 30_001) == ("ilu", "iterative", "direct")
+    assert choose("auto", 3, 30_001, contact=False) == ("iterative", "direct")
+    assert choose("auto", 3, 10**6) == ("ilu", "iterative")
+    assert choose("iterative", 3, 10**6) == ("iterative",)
     assert choose("auto", 3, 30_000, contact=False) == ("direct",)
     assert choose("auto", 2, 30_000) == ("direct",)
     assert choose("ilu", 3, 100) == ("ilu",)
     assert [solid_solver.iterations_allowed(n) for n in (600, 6_000, 10**6)] == [30, 120, 300]
+
+
+def test_multigrid_that_stalls_is_replaced(monkeypatch):
+    """A nearly incompressible cube is sheared: `auto` gives what the direct solver gives, multigrid alone nothing."""
+    monkeypatch.setitem(solid_solver.linear.DIRECT_LIMIT, 3, 100)
+    ends = []
+    for method in ("direct", "auto", "iterative"):
+        structure = make_structure(
+            shapes.box([1, 1, 1], [8, 8, 8]),
+            NeoHooke(*lame(1000.0, 0.4999)),
+            element="mixed",
+            supports=[Support("left", vector(0, 0, 0))],
+            tractions=[Traction("right", vector(0, 10, 0))],
+            settings=SolverSettings(Tolerance(residual=1e-8), linear=method),
+        )
+        if method == "iterative":
+            with pytest.raises(StepFailed, match="stalled"):
+                load_step(structure)
+        else:
+            load_step(structure)
+            ends.append(structure.now.u.copy())
+            assert structure.solver.position == (method == "auto")
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-12 * np.abs(ends[0]).max())

@@ -145,7 +145,7 @@ MISTAKES = [
     (
         MESH,
         MESH + "\n      element: bbar",
-        "9:16: 'element' must be 'displacement' or 'mixed', not 'bbar'",
+        "9:16: 'element' must be 'auto', 'displacement' or 'mixed', not 'bbar'",
         "bbar",
     ),
     (

@@ -151,32 +151,10 @@ def test_windows_line_ends_and_byte_order_mark(tmp_path):
     assert case.locate("structure", "bodies", "block", "mesh", "shape") == f"{case.path}:5:21"
 
 
-TRIANGLES = (
-    "{mesh: {shape: rectangle, size: [1, 1], cells: [1, 1], cell: tri}, material: {law: neo_hooke, E: 1e6, nu: 0.45}}"
-)
-
-
 @pytest.mark.parametrize(
     ("override", "place", "warning"),
     [
         ("time.step=3", "--set time.step=3", "the step 3 is longer than the run, 2"),
-        (
-            "structure.bodies.block.material.nu=0.499",
-            "{path}:5:13",
-            "first-order cells lock for nearly incompressible material (nu = 0.499); "
-            "take 'element: mixed' or 'order: 2'",
-        ),
-        (
-            "structure.bodies.block.material={law: neo_hooke, lambda: 1e6, mu: 1e3}",
-            "{path}:5:13",
-            "first-order cells lock for nearly incompressible material (nu = 0.4995); "
-            "take 'element: mixed' or 'order: 2'",
-        ),
-        (
-            f"structure.bodies.block={TRIANGLES}",
-            f"--set structure.bodies.block={TRIANGLES}",
-            "first-order cells lock for nearly incompressible material (nu = 0.45); take 'order: 2'",
-        ),
         (
             "units={length: mm, mass: t}",
             "{path}:7:37",
@@ -202,12 +180,6 @@ def test_warnings(case_of, override, place, warning):
 def test_plausible_numbers_in_other_units(case_of):
     steel = "{law: neo_hooke, E: 210e3, nu: 0.3, density: 7.85e-9}"
     assert case_of(MINIMAL, "units={length: mm, mass: t}", f"structure.bodies.block.material={steel}").warnings == ()
-
-
-@pytest.mark.parametrize("cure", ["mesh.order=2", "element=mixed", "material.nu=0.449"])
-def test_cells_that_do_not_lock(case_of, cure):
-    nearly_incompressible = "structure.bodies.block.material.nu=0.499"
-    assert case_of(MINIMAL, nearly_incompressible, f"structure.bodies.block.{cure}").warnings == ()
 
 
 def test_summary(case_of):
