@@ -88,13 +88,13 @@ class GaussSeidel(PythonContext):
         fields, A21 = self._fields, self._fields.blocks[1][0]
         with fields.parts(x) as (x1, x2), fields.parts(y) as (y1, y2):
             self._factors.solve(x1, y1)
-            found = None if self._levels is None else self._levels.correct(y1, x2)
+            levels = None if self._levels is None else self._levels.correct(y1, x2)
             right = x2.duplicate()
             A21.mult(y1, right)
             right.aypx(-1.0, x2)
             self.second.apply(right, y2)
-            if self._levels is not None:
-                self._levels.set(y2, found)
+            if self._levels is not None and levels is not None:
+                self._levels.set(y2, levels)
             if self._factors.getConvergedReason() < 0:
                 y1.set(math.nan)  # the outer method stops at it
 
