@@ -252,9 +252,13 @@ class Monolithic:
         sequence, of_flow_alone = flow.sequence, None
         if sequence.multigrid:
             of_flow_alone = flow.multigrid(blocks.flow, of_flow)
-        few, fill = self.coupled.solid.few(), sequence.current == "fill"
         krylov = linear.coupled_solver(
-            self.comm, tolerance=flow.linear_tolerance, fill=fill, flow=of_flow_alone, few=few
+            self.comm,
+            tolerance=flow.linear_tolerance,
+            fill=sequence.current == "fill",
+            flow=of_flow_alone,
+            few=self.coupled.solid.few(),
+            levels=flow.free_levels(),
         )
         sequence.limit(krylov)
         return krylov

@@ -322,6 +322,10 @@ class IterativeFlow(Protocol):
         """The tangent as it multiplies vectors in a Krylov method that reduces the residual so far."""
         ...
 
+    def free_levels(self) -> Array | None:
+        """Pressure levels that solids alone determine, 1 at their owned unknowns, shape (owned, levels); None: none."""
+        ...
+
 
 class StartOfSolid(Protocol):
     """Start steps of a solid, with the acceleration a = (u - u_n) / dt^2."""

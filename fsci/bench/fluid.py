@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -157,7 +158,14 @@ def ring(count: int, around: int, radius: float, thickness: float, tilt: float) 
     return flat @ turn.T, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def ring_in_channel(cells: int, timer: Timer, comm: MPI.Comm = MPI.COMM_SELF, *, steady: bool = False) -> Fluid:
+def ring_in_channel(
+    cells: int,
+    timer: Timer,
+    comm: MPI.Comm = MPI.COMM_SELF,
+    *,
+    steady: bool = False,
+    element: Literal["q1q1", "q2q1"] = "q1q1",
+) -> Fluid:
     """A tilted ring that sinks through a channel, Reynolds number 200 by its width; steady: at rest (collective)."""
     points, facets = ring(64, 32, 0.5, 0.2, math.radians(65.0))
     speed = np.array([0.0, 0.0, -0.2])
@@ -172,7 +180,7 @@ def ring_in_channel(cells: int, timer: Timer, comm: MPI.Comm = MPI.COMM_SELF, *,
     ]
     motion = None if steady else lambda t: (points + t * speed, 0.0 * points + speed)
     body = rigid_body("ring", points, facets, motion)
-    flow = FlowSettings(1.0, 0.01, scheme="steady" if steady else "backward_euler")
+    flow = FlowSettings(1.0, 0.01, scheme="steady" if steady else "backward_euler", element=element)
     solver = SolverSettings(Tolerance(1e-6), linear_tolerance=1e-5)
     grid = uniform([-1.0] * 3, [1.0] * 3, [cells] * 3)
     return Fluid(grid, flow, patches, [body], solver, timer=timer, comm=comm)

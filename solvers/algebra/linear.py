@@ -259,17 +259,24 @@ def incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
 
 
 def coupled_solver(
-    comm, *, tolerance: float, fill: bool = False, flow: PETSc.PC | None = None, few: Indices | None = None
+    comm,
+    *,
+    tolerance: float,
+    fill: bool = False,
+    flow: PETSc.PC | None = None,
+    few: Indices | None = None,
+    levels: Array | None = None,
 ) -> PETSc.KSP:
     """FGMRES for structure and flow together, a matrix of `TwoFields`, with block Gauss-Seidel as preconditioner.
 
     That of the structure is `solid_preconditioner`; flow: that of the flow, None: incomplete factors on overlapping
-    subdomains (fill: more fill and overlap). few: numbers of unknowns of the structure that are eliminated exactly.
+    subdomains (fill: more fill and overlap). few: numbers of unknowns of the structure that are eliminated exactly;
+    levels: pressure levels of the flow that the structure determines, shape (owned unknowns, levels).
     """
     if flow is None:
         flow = _from_options(comm, "coupled_flow_", incomplete_factors(comm, **(FILL if fill else BLOCKS)))
     ksp = _gmres(comm, tolerance, 600, restart=150, flexible=True)
-    blocks = GaussSeidel(solid_preconditioner, flow)
+    blocks = GaussSeidel(solid_preconditioner, flow, levels)
     if few is None or len(few) == 0:
         _set_context(ksp.getPC(), blocks)
     else:

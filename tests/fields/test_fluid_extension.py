@@ -1,13 +1,15 @@
 """Nodes of q2q1 that fluid hardly reaches: they continue polynomials exactly, lose nothing, and no constant matters."""
 
-from functools import partial
+from functools import partial, reduce
+from itertools import product
 
 import numpy as np
 import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step, turned, wall
+from scipy.optimize import brentq
 
 from fsci.bench import fluid as bench
-from solvers.fluid.cut.extension import FREE_SHARE, Extension
+from solvers.fluid.cut.extension import FREE_SHARE, Extension, lagrange
 from solvers.fluid.grid.box import Grid, uniform
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.penalties import Penalties
@@ -60,6 +62,48 @@ def test_polynomials_have_no_distance_to_their_extension(scheme):
     assert np.abs(quadratic[pressure]).max() > 1e-4 * rough[pressure].max()
 
 
+def amplification(dim, degree, points, weights, at):
+    """Largest value at a place of a polynomial of mean square 1 in the region of a quadrature rule."""
+
+    def functions(x):
+        factors = [lagrange(x[:, axis], degree) for axis in range(dim)]
+        return reduce(lambda a, b: (a[:, :, None] * b[:, None, :]).reshape(len(a), -1), factors)
+
+    N, value = functions(points), functions(np.array([at], dtype=float))[0]
+    return np.sqrt(weights.sum() * value @ np.linalg.solve((N.T * weights) @ N, value))
+
+
+def below_a_corner(dim, level):
+    """Quadrature rule of sum(x) < level in the unit cell: simplices at its corners, with alternating signs."""
+    places, w = np.polynomial.legendre.leggauss(8)
+    grids = (np.stack(np.meshgrid(*[some] * dim), axis=-1).reshape(-1, dim) for some in (0.5 + places / 2, w / 2))
+    simplex, weights = next(grids), next(grids).prod(axis=1)
+    left = np.cumprod(np.column_stack([np.ones(len(simplex)), 1.0 - simplex[:, :-1]]), axis=1)
+    simplex, weights = simplex * left, weights * left.prod(axis=1)
+    corners = [np.array(corner) for corner in product((0, 1), repeat=dim) if sum(corner) < level]
+    sizes = [level - corner.sum() for corner in corners]
+    points = [corner + size * simplex for corner, size in zip(corners, sizes, strict=True)]
+    signed = [(-1) ** corner.sum() * size**dim * weights for corner, size in zip(corners, sizes, strict=True)]
+    return np.concatenate(points), np.concatenate(signed)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_free_nodes_are_determined_as_well_as_the_neighbours_of_a_whole_cell(dim, degree):
+    """Where a plane cuts off a corner; planes along the cell amplify less."""
+    neighbour = amplification(dim, degree, *below_a_corner(dim, dim), [2.0] + [1.0] * (dim - 1))
+    assert neighbour == pytest.approx(np.sqrt({1: 28, 2: 873}[degree]) * (degree + 1) ** (dim - 1), rel=1e-9)
+
+    def excess(level):
+        return amplification(dim, degree, *below_a_corner(dim, level), [1.0] * dim) - neighbour
+
+    share = below_a_corner(dim, brentq(excess, 0.5 * dim, dim))[1].sum()
+    assert share == pytest.approx(FREE_SHARE[dim], abs=0.005 if degree == 2 else 0.025)
+    points, weights = below_a_corner(dim, dim)
+    along = amplification(dim, degree, points * ([1.0] * (dim - 1) + [FREE_SHARE[dim]]), weights, [1.0] * dim)
+    assert along < neighbour
+
+
 def test_rounding_is_not_amplified_far_from_the_fluid():
     """Behind a corner of the fluid in space a parabola would be 117,649 times as large: a line goes on, 729 times."""
     grid, share = uniform([0, 0, 0], [1, 1, 1], [8, 8, 8]), np.zeros((8, 8, 8))
@@ -107,7 +151,7 @@ def test_nodes_of_well_cut_cells_are_free():
         np.maximum.at(largest, unknowns.cell_velocity[cells], share[cells, None, None])
     dofs = unknowns.velocity.dofs
     asked = fluid.system.active_dofs[dofs] & ~np.isin(dofs, fluid.parts.boundary.dofs)
-    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < FREE_SHARE)[asked])
+    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < FREE_SHARE[2])[asked])
     assert np.array_equal(ghost.outside[dofs][asked], (largest[dofs] == 0.0)[asked])
     assert ghost.outside.sum() > 20
 

@@ -388,3 +388,12 @@ def test_rows_of_the_identity_keep_their_entries_on_several_processes():
 if __name__ == "__main__":
     _, iterations = around_a_ball(uniform([-2.0] * 3, [2.0] * 3, [7] * 3), "iterative", "q2q1", comm=MPI.COMM_WORLD)
     assert iterations <= 10
+
+
+@pytest.mark.slow
+def test_second_degree_at_reynolds_number_200():
+    """Poorly cut nodes that counted as free in 3D left Newton's method without a solution, after any count of steps."""
+    fluid = ring_in_channel(12, Timer(), steady=True, element="q2q1")
+    fluid.initialise(0.0, 1.0)
+    fluid.begin_step(0.0, 1.0)
+    assert fluid.solve().iterations <= 8

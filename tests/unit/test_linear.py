@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -284,6 +285,34 @@ def test_system_of_two_fields():
     y1 = np.linalg.solve(whole[:5, :5], b.array[:5])
     y2 = np.linalg.solve(whole[5:, 5:], b.array[5:] - whole[5:, :5] @ y1)
     assert np.abs(x.array - np.concatenate([y1, y2])).max() < 1e-12
+
+
+def test_levels_that_the_first_field_determines():
+    """The second field is singular, its pivots rounding errors: one application solves for the level exactly.
+
+    Without it the level is 1e10 times too large or so.
+    """
+    fields, whole = two_fields()
+    level = np.array([0.0, 1, 1, 0, 1, 1, 1, 0])
+    without = np.eye(8) - np.outer(level, level) / level.sum()
+    whole[5:, 5:] = without @ whole[5:, 5:] @ without
+    matrix = matrix_of(replace(fields, blocks=(fields.blocks[0], (fields.blocks[1][0], dense(whole[5:, 5:])))))
+    b, x = matrix.createVecs()
+    b.array[:] = np.arange(13.0)
+    one = np.zeros(13)
+    one[5:] = level
+    sources = []
+    for levels in (None, level[:, None]):
+        ksp = linear.coupled_solver(PETSc.COMM_SELF, tolerance=1e-10, levels=levels)
+        ksp.setOperators(matrix)
+        ksp.setUp()
+        ksp.getPC().apply(b, x)
+        sources.append(abs(one @ (b.array - whole @ x.array)))
+    assert sources[1] < 1e-12 * np.abs(b.array).sum()
+    assert sources[0] > 1e-3
+    linear.solve(ksp, matrix, b, x)
+    assert np.abs(whole @ x.array - b.array).max() < 1e-8
+    assert ksp.getIterationNumber() <= 6  # five unknowns of the first field and one
 
 
 def test_few_unknowns_are_eliminated_exactly():

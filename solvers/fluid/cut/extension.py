@@ -3,6 +3,10 @@
 The share of fluid of a node is that of the best of its cells, relative to the best cell nearby. Nodes below FREE_SHARE
 are dependent: each has a root, the well-cut cell nearby whose polynomial amplifies least at the node, and the extension
 E u(x_i) = sum_b N_b(x_i) u_b by the shape functions of the root, continued outside of it.
+
+A polynomial of mean square 1 in a part of a cell is at most A at a node, A^2 = |part| (M^-1)_ii with the mass matrix M
+of the part. From FREE_SHARE on the fluid in a cell determines its worst node at least as well (A is as small) as an
+uncut cell determines nodes one cell away, whatever the direction of a plane surface.
 Sources: Badia, Neiva, Verdugo, arXiv:2106.13728 (the penalty on the distance to the extension does not lock, its limit
 is the aggregated finite element method); Burman, Hansbo, Larson, arXiv:2205.01340.
 """
@@ -21,9 +25,10 @@ from solvers.fluid.geometry.thin.sheet_windows import SheetWindows
 from solvers.fluid.geometry.thin.sheets import Sheets
 from solvers.fluid.grid.box import Grid
 
-#: Shares of fluid, relative to the best cell nearby. From FREE_SHARE on a cell may be a root and its nodes are free. Up
-#: to PENALISED_SHARE the penalty on the distance to the extension has its full weight.
-FREE_SHARE, PENALISED_SHARE = 0.6, 0.2
+#: Share of fluid, relative to the best cell nearby, from which on a cell may be a root and its nodes are free, by
+#: dimension: where the two amplifications above are equal for the worst plane, which cuts off a corner. (For
+#: polynomials of first degree 0.69 and 0.79.)
+FREE_SHARE = {2: 0.7, 3: 0.81}
 
 #: Layers of cells around those of a node that count as nearby.
 LAYERS_NEARBY = 2
@@ -44,7 +49,7 @@ class Dependent:
 
     nodes: Indices
     rows: sparse.csr_matrix  #: E, shape (dependent nodes, nodes of the lattice)
-    weight: Array  #: of the distance to the extension: 1 for small shares of fluid, decreasing to 0 at free nodes
+    weight: Array  #: of the distance to the extension: 1 without fluid, decreasing to 0 at free nodes
     dry: NDArray[np.bool_]  #: nodes whose cells have no fluid: their values are those of the extension
     undetermined: Indices  #: nodes of active cells with no root
 
@@ -54,7 +59,7 @@ class Extension:
 
     def __init__(self, grid: Grid, degree: int, shape: tuple[int, ...], numbers: Indices, sheets: Sheets | None = None):
         """numbers: the nodes of this process, in the lattice of this degree and shape, x fastest, or in `sheets`."""
-        self.grid, self.degree, self.shape = grid, degree, shape
+        self.grid, self.degree, self.shape, self._free = grid, degree, shape, FREE_SHARE[grid.dim]
         self._sheets = None if sheets is None else SheetWindows(sheets, degree, numbers)
         self.size = int(np.prod(shape)) if sheets is None else sheets.node_count(degree)  #: count of node numbers
         lattice_numbers = numbers if sheets is None else sheets.on_lattice(numbers, degree)
@@ -86,16 +91,18 @@ class Extension:
 
         share: fluid in each cell of the mesh; active: cells with unknowns; reach: largest distance of a root [cells].
         """
-        nodes = self._nodes_of(np.flatnonzero(active & (share < FREE_SHARE)))
+        nodes = self._nodes_of(np.flatnonzero(active & (share < self._free)))
         largest, best = (self._largest(nodes, share, layers) for layers in (0, LAYERS_NEARBY))
-        poor = (largest < FREE_SHARE * best) | (largest == 0.0)
+        poor = (largest < self._free * best) | (largest == 0.0)
         nodes = nodes[poor]
         relative = np.divide(largest, best, out=np.zeros(len(largest)), where=best > 0.0)[poor]
         self._forget_covered(nodes, share)
         self._find_roots(nodes[self._row_of[nodes] < 0], share, reach)
         rooted = self._row_of[nodes] >= 0
         rows = self._rows[self._row_of[nodes[rooted]]]
-        return Dependent(nodes[rooted], rows, _weight(relative[rooted]), relative[rooted] == 0.0, nodes[~rooted])
+        return Dependent(
+            nodes[rooted], rows, _weight(relative[rooted], self._free), relative[rooted] == 0.0, nodes[~rooted]
+        )
 
     def _nodes_of(self, cells: Indices) -> Indices:
         """The nodes of cells, sorted, each once."""
@@ -164,7 +171,7 @@ class Extension:
         cells, inside = self._cells_around(nodes, layers)
         fluid = np.where(inside, share[cells], 0.0)
         best = fluid.max(axis=1, initial=0.0)[:, None]
-        cost = np.where((fluid >= FREE_SHARE * best) & (fluid > 0.0), cost, np.inf)
+        cost = np.where((fluid >= self._free * best) & (fluid > 0.0), cost, np.inf)
         least = cost.min(axis=1, initial=np.inf)[:, None]
         at, chosen = np.nonzero((cost <= (1.0 + 1e-9) * least) & np.isfinite(cost))
         columns, weights = self._entries(nodes[at], layers, chosen, cost[at, chosen] > LARGEST_FACTOR)
@@ -222,9 +229,9 @@ def lagrange(s: Array, degree: int) -> Array:
     return np.stack([(2.0 * s - 1.0) * (s - 1.0), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=-1)
 
 
-def _weight(relative: Array) -> Array:
-    """Weight of the penalty: a cubic from 1 at PENALISED_SHARE to 0 at FREE_SHARE with zero slope at both."""
-    s = np.clip((FREE_SHARE - relative) / (FREE_SHARE - PENALISED_SHARE), 0.0, 1.0)
+def _weight(relative: Array, free: float) -> Array:
+    """Weight of the penalty: a cubic from 1 without fluid to 0 at `free` with zero slope at both."""
+    s = np.clip(1.0 - relative / free, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 

@@ -143,7 +143,7 @@ def creeping_cells(grid: Grid, factor: Array, solid: NDArray[np.bool_], share: A
     factor: of `Films`; solid: solid cells; share: of fluid; all by cells of the box.
     """
     beside = ndimage.maximum_filter(grid.as_box(solid & (factor < 1.0)), 3).ravel(order="F")
-    return (factor < 1.0) | (beside & (share < FREE_SHARE))
+    return (factor < 1.0) | (beside & (share < FREE_SHARE[grid.dim]))
 
 
 def film_cells(

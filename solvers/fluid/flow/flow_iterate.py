@@ -149,6 +149,10 @@ class FlowIterate:
         """
         return self.solver.products.of(matrix, max(self.linear_tolerance, reduction))
 
+    def free_levels(self) -> Array | None:
+        """Pressure levels that no row of the flow determines, 1 at their owned dofs, shape (owned, levels)."""
+        return self._levels.free()
+
     def add_rounding(self, error: Array) -> None:
         """Add rounding errors that another field causes in these equations; call it after `linearise`."""
         self._tangent.add_rounding(error)

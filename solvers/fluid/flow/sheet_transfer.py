@@ -166,7 +166,7 @@ def _continued_to(
     at, cell = at[own], cell[own]
     fullest = np.zeros(len(numbers))
     np.maximum.at(fullest, at, sheets.fluid[cell])
-    well = (sheets.fluid[cell] >= FREE_SHARE * fullest[at]) & (sheets.fluid[cell] > 0.0)
+    well = (sheets.fluid[cell] >= FREE_SHARE[grid.dim] * fullest[at]) & (sheets.fluid[cell] > 0.0)
     at, cell = at[well], cell[well]
     of_box = np.stack(np.unravel_index(sheets.box_cells(cell), grid.shape, order="F"), axis=1)
     local = np.empty((len(at), grid.dim))

@@ -39,6 +39,7 @@ class PressureLevels:
         self._system, self._comm = system, system.grid.comm
         self._elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in bodies] + [[]]) > 0.0
         self._holds: list[Hold] = []
+        self._free: list[Mask] = []  #: owned pressure dofs of pockets whose level solids determine
         self._excess: list[float] = []  #: net flux out of each of them by the motion of its boundary [m^3/s]
 
     @property
@@ -47,12 +48,26 @@ class PressureLevels:
         return any(hold.elastic for hold in self._holds)
 
     def hold(self, held: Mask, *, set_by_solids: bool) -> None:
-        """Find the pockets of a new cut and add their nodes to the held owned dofs; see `hold_pressure`."""
-        self._holds = hold_pressure(self._system, self._elastic, set_by_solids=set_by_solids)
+        """Find the pockets of a new cut and add a node of those that are held to the held owned dofs.
+
+        set_by_solids: the equations of elastic bodies determine the level of their pockets, which are not held. In a
+        closed box, the level of the largest pocket is zero at its node, if no elastic body is in it. Other levels are
+        those of the last iterate.
+        """
+        pockets, closed = closed_pockets(self._system, self._elastic), self._system.boundary.closed()
+        held_ones = [pocket for pocket in pockets if not (pocket.elastic and set_by_solids)]
+        sizes = _pressure_sizes(self._system) if held_ones else np.empty(0)
+        keeps_level = [pocket.elastic or not (closed and pocket.largest) for pocket in held_ones]
+        self._holds = [_hold(self._system, *each, sizes) for each in zip(held_ones, keeps_level, strict=True)]
+        self._free = [_inside(self._system, pocket) for pocket in pockets if pocket.elastic and set_by_solids]
         for hold in self._holds:
             held[hold.dofs] = True
             if not hold.keeps_level:
                 self._system.flow.x.array[hold.dofs] = 0.0
+
+    def free(self) -> Array | None:
+        """The levels that solids determine, 1 at their owned dofs, shape (owned, levels); None: there are none."""
+        return np.stack(self._free, axis=1).astype(float) if self._free else None
 
     def keep(self, flow: Array) -> None:
         """Shift the pressure, at owned dofs, of each pocket that keeps its level, so that its mean is kept.
@@ -88,25 +103,15 @@ class PressureLevels:
         self._system.unknowns.share(self._system.flow)
 
 
-def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> list[Hold]:
-    """The pockets whose level is held, with one node each (collective).
-
-    elastic: mask of vertices that another field moves; set_by_solids: the equations of these fields determine the
-    level of their pockets, which are not held. In a closed box, the level of the largest pocket is zero at its node, if
-    no elastic body is in it. Other levels are those of the last iterate.
-    """
+def closed_pockets(system: FlowSystem, elastic: Mask) -> list[Pocket]:
+    """The pockets of the present cut (collective); elastic: mask of vertices that another field moves."""
     closed = system.boundary.closed()
     if not (closed or system.with_bodies):
         return []
     assert system.cut is not None
     if not closed and not _in_fluid(system.grid, system.cut):
         return []
-    open_cells, periodic = system.boundary.open_cells(), system.unknowns.periodic
-    pockets = find_pockets(system.grid, system.cut, open_cells, elastic, periodic)
-    pockets = [pocket for pocket in pockets if not (pocket.elastic and set_by_solids)]
-    sizes = _pressure_sizes(system) if pockets else np.empty(0)
-    keeps_level = [pocket.elastic or not (closed and pocket.largest) for pocket in pockets]
-    return [_hold(system, *each, sizes) for each in zip(pockets, keeps_level, strict=True)]
+    return find_pockets(system.grid, system.cut, system.boundary.open_cells(), elastic, system.unknowns.periodic)
 
 
 def _in_fluid(grid: DistributedGrid, cut: Cut) -> bool:
@@ -129,16 +134,24 @@ def _pressure_sizes(system: FlowSystem) -> Array:
     return owned if unknowns.hanging is None else unknowns.hanging.rows(owned)
 
 
+def _inside(system: FlowSystem, pocket: Pocket) -> Mask:
+    """Mask of the owned pressure dofs of a pocket (collective)."""
+    unknowns = system.unknowns
+    dofs = unknowns.pressure.dofs[: unknowns.pressure.owned, 0]
+    found = np.zeros(unknowns.owned, dtype=bool)
+    found[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
+    found &= system.active_dofs[: unknowns.owned]
+    if unknowns.hanging is not None:
+        found &= ~unknowns.hanging.dofs[: unknowns.owned]
+    return found
+
+
 def _hold(system: FlowSystem, pocket: Pocket, keep_level: bool, sizes: Array) -> Hold:
     """Hold a pocket at its first node in the lattice, if possible one that had a pressure before (collective)."""
     unknowns, comm = system.unknowns, system.grid.comm
     nodes, last = unknowns.pressure, np.iinfo(np.int64).max
     dofs = nodes.dofs[: nodes.owned, 0]
-    inside = np.zeros(unknowns.owned, dtype=bool)
-    inside[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
-    inside &= system.active_dofs[: unknowns.owned]
-    if unknowns.hanging is not None:
-        inside &= ~unknowns.hanging.dofs[: unknowns.owned]
+    inside = _inside(system, pocket)
     numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)
     had_pressure = np.where(system.flow.x.array[dofs] != 0.0, numbers, last)
     choices = [had_pressure, numbers] if keep_level else [numbers]
