@@ -46,7 +46,7 @@ SAME_FORCES = 1e-9
 
 #: Change of the normal forces, relative to the largest, of such steps: the gaps that are missed are a thousandth of it,
 #: relative to the motion by these forces. Rounding errors of positions cause 3e-9.
-NEGLIGIBLE_CHANGE = 1e-7
+NEGLIGIBLE_CHANGE = 1e-5
 
 #: Proximal steps: with tree-like contacts 5 suffice, with a bracing of bodies some tens.
 PROXIMAL_STEPS = 200

@@ -46,11 +46,16 @@ class FlowInMotion(Protocol):
     def began(self) -> StepInMotion | None: ...
 
 
-def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
-    """Layers of cells that surfaces may uncover within some time [s]; smallest: shortest edge of a cell [m]."""
-    fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
-    layers = 1.25 * time * fastest / smallest
-    return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # the grid has no more layers
+def strip_layers(grid: DistributedGrid, moving: MovingBodies, time: float, smallest: float) -> NDArray[np.int64]:
+    """Layers of cells that each facet may uncover within some time [s], by the fastest vertex of its body.
+
+    smallest: shortest edge of a cell [m].
+    """
+    counts, facets = [], [len(body.surface.facets) for body in moving.bodies]
+    for motion in moving.motions:
+        layers = 1.25 * time * float(np.linalg.norm(motion.v, axis=1).max(initial=0.0)) / smallest
+        counts.append(math.ceil(min(max(1.0, layers), max(grid.grid.shape))))  # the grid has no more layers
+    return np.repeat(np.array(counts, dtype=np.int64), facets)
 
 
 def require_history(fluid: FlowInMotion, cut: Cut, missing: NDArray[np.bool_]) -> None:
