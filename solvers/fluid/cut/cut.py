@@ -140,20 +140,15 @@ class Cutter:
         self._depth = 0
 
     def __call__(
-        self,
-        facets: NDArray[np.int64],
-        motion: Motion,
-        layers: NDArray[np.int64] | int,
-        wet: NDArray[np.bool_] | None = None,
+        self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
     ) -> Cut:
-        """The cut by surfaces, with so many layers of cells behind them kept active; layers: of each facet, or of all.
+        """The cut by surfaces, with so many layers of cells behind them kept active.
 
         wet: facets that the flow acts on. The others, and those on the boundary of the box, only close the solid.
         """
         if not len(facets):
             self._whole = self._whole or self._without_surfaces(facets, motion)
             return self._whole
-        layers = np.broadcast_to(layers, len(facets))
         first, begins = self._first, not self._special.any()
         if first is not None and (begins or np.array_equal(self._special, first.special)):
             if (same := first.where(facets, motion, layers)) is not None:
@@ -166,14 +161,8 @@ class Cutter:
         self._first = _First(cut, layers, self._special.copy()) if begins else None
         return cut
 
-    def _cut(
-        self,
-        facets: NDArray[np.int64],
-        motion: Motion,
-        by_facet: NDArray[np.int64],
-        wet: NDArray[np.bool_] | None,
-    ) -> Cut:
-        grid, box, layers = self.grid, self.grid.grid, int(by_facet.max())
+    def _cut(self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None) -> Cut:
+        grid, box = self.grid, self.grid.grid
         if grid.sheets is not None:
             self._special[:] = False  # a cell behind a thin body is one of its other side
         self._depth = max(self._depth, layers)
@@ -200,7 +189,8 @@ class Cutter:
         if grid.sheets is not None:
             is_cut[grid.sheets.touching] = True  # where bodies overlap, the sum of their volumes may exceed the cell
         solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut  # surfaces that touch keep their cells: they may part
-        strip = solid & (self._behind(moments, is_cut, by_facet) | self._special)
+        near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
+        strip = solid & (near | self._special)
         self._special |= is_cut | strip
         touching = solid & (self._facing(moments, counts, piece_normal) | self._covered(motion.x[facets[~off]]))
         if self._closing is not None:
@@ -304,16 +294,6 @@ class Cutter:
         """Cells with cut penalty and one layer around them; without the layer around bodies at rest."""
         return _grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
 
-    def _behind(self, moments, is_cut: NDArray[np.bool_], by_facet: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Box cells in the layers around cut cells, as many as the facets in these have."""
-        layers = np.zeros(len(is_cut), dtype=np.int64)
-        np.maximum.at(layers, moments.cells[moments.piece_cell], by_facet[moments.piece_facet])
-        layers[is_cut & (layers == 0)] = by_facet.max()  # partly solid without a facet
-        found = is_cut.copy()
-        for count in np.unique(by_facet):
-            found |= _grow(self.grid.grid.as_box(is_cut & (layers == count)), int(count)).ravel(order="F")
-        return found
-
     def _cut_cells(self, moments, cells, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Box cells that are cut, and those whose pieces of surface are more than slivers."""
         area = np.bincount(cells[touched], moments.piece_mass[touched].sum(axis=(1, 2)), len(self._slivers))
@@ -368,14 +348,14 @@ class _First:
     """The first cut of a step, which is used again while the surfaces do not move."""
 
     cut: Cut
-    layers: NDArray[np.int64]
+    layers: int
     special: NDArray[np.bool_]  #: box cells under the cut penalty
 
-    def where(self, facets: NDArray[np.int64], motion: Motion, layers: NDArray[np.int64]) -> _First | None:
+    def where(self, facets: NDArray[np.int64], motion: Motion, layers: int) -> _First | None:
         """This cut with the present velocities of the surfaces; None if their positions have changed."""
         cut = self.cut
         if (
-            not np.array_equal(layers, self.layers)
+            layers != self.layers
             or not np.array_equal(cut.motion.x, motion.x)
             or not np.array_equal(cut.facets, facets)
         ):

@@ -278,10 +278,9 @@ class Fluid:
             cutter.forget()
             self.system.forget_roots()
         wet = surfaces.wet_in_unions if cutter.unions or self.grid.sheets is not None else surfaces.wet
-        # of cells behind the surface that the next steps may uncover; none around thin bodies
-        layers: NDArray[np.int64] | int = 0
+        layers = 0  # of cells behind the surface that the next steps may uncover; none around thin bodies
         if not (self.moving.thin.follows or self.steady or self.moving.rest):
-            layers = reach.strip_layers(self.grid, self.moving, self.times * self.current.dt, self.smallest_cell)
+            layers = reach.strip_layers(self.grid, motion, self.times * self.current.dt, self.smallest_cell)
         cut = cutter(facets, motion, layers, wet)
         reach.require_finest(cutter, self.comm)
         return cut

@@ -46,17 +46,11 @@ class FlowInMotion(Protocol):
     def began(self) -> StepInMotion | None: ...
 
 
-def strip_layers(grid: DistributedGrid, moving: MovingBodies, time: float, smallest: float) -> NDArray[np.int64]:
-    """Layers of cells that each facet may uncover within some time [s]; smallest: shortest edge of a cell [m].
-
-    A body with a motion of its own needs as many as its fastest vertex. Bodies that others move may be hit by any body,
-    and have in the next step the velocity of the fastest one.
-    """
-    cells = [1.25 * time * float(np.linalg.norm(m.v, axis=1).max(initial=0.0)) / smallest for m in moving.motions]
-    hit = max(cells, default=0.0)
-    needed = [hit if body.motion is None else own for body, own in zip(moving.bodies, cells, strict=True)]
-    layers = [math.ceil(min(max(1.0, one), max(grid.grid.shape))) for one in needed]  # the grid has no more layers
-    return np.repeat(np.array(layers, dtype=np.int64), [len(body.surface.facets) for body in moving.bodies])
+def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
+    """Layers of cells that surfaces may uncover within some time [s]; smallest: shortest edge of a cell [m]."""
+    fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
+    layers = 1.25 * time * fastest / smallest
+    return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # the grid has no more layers
 
 
 def require_history(fluid: FlowInMotion, cut: Cut, missing: NDArray[np.bool_]) -> None:

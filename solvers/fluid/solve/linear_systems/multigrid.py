@@ -29,7 +29,7 @@ from solvers.fluid.solve.linear_systems.near_smoother import NearSmoother
 #: What is added to the diagonal of unknowns behind surfaces for the smoother, relative to the sum of |entries| of the
 #: row. Without it incomplete factors of three layers in stretched cells amplify by 1e16; from 0.05 to 100 multigrid
 #: takes as many iterations.
-BEHIND = 1.0
+BEHIND = 0.05
 
 #: Unknowns below which a level is solved directly, in less time than the levels above take to smooth.
 COARSEST = 2_000
