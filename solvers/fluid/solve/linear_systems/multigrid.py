@@ -27,8 +27,9 @@ from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
 from solvers.fluid.solve.linear_systems.near_smoother import NearSmoother
 
 #: What is added to the diagonal of unknowns behind surfaces for the smoother, relative to the sum of |entries| of the
-#: row. Without it incomplete factors of three layers in stretched cells amplify by 1e16; from 0.05 to 100 multigrid
-#: takes as many iterations.
+#: row. Without it incomplete factors of three layers in stretched cells amplify by 1e16. From 0.01 to 0.2 a ball that
+#: falls in a tube takes 56 to 61 iterations in two steps; with 1 it takes 108, for smoothers then move these unknowns
+#: slowly.
 BEHIND = 0.05
 
 #: Unknowns below which a level is solved directly, in less time than the levels above take to smooth.
