@@ -1,10 +1,14 @@
 """Bodies that cross more than a cell in a step are named by `fsci check` and by the run, with a step that is small."""
 
 import pytest
+from mpi4py import MPI
 
+from fsci.builder.build import build
 from fsci.case import load_case
 from fsci.check.meshes import check_meshes
 from fsci.running.run import FAILED, FINISHED, run_case
+from solvers.march import march
+from solvers.timing import Timer
 
 CASE = """
 time: {step: 0.1, end: 0.2}
@@ -73,3 +77,42 @@ def test_less_than_two_cells(tmp_path):
     warnings, log = run(tmp_path, "1.9")
     assert warnings == ()
     assert "cells in a time step" not in log
+
+
+BALL = """\
+time: {step: 0.5, end: 1}
+fluid:
+  density: 1
+  viscosity: 1
+  flow: stokes
+  scheme: bdf2
+  grid:
+    from: [0, 0, -3]
+    to: [1.05, 1.05, 3]
+    cells: [14, 14, null]
+    z: [{to: -0.75, cells: 12, ratio: 0.4}, {to: 0.75, cells: 20}, {to: 3, cells: 12, ratio: 2.5}]
+  patches:
+    planes: {on: [x-, y-], symmetry: true}
+    walls: {on: [x+, y+, z-, z+], no_slip: true}
+  bodies:
+    tube: {mesh: {shape: tube, inner_radius: 1, outer_radius: 1.8, height: 8, cells: [96, 1, 1], translate: [0, 0, -4]}}
+    ball:
+      mesh: {shape: sphere, radius: 0.5, cells: [12, 1]}
+      free: {density: 2, gravity: [0, 0, -0.5], held: [x, y, rotation]}
+coupling: {scheme: monolithic}
+output: {fields_every: 0}
+"""
+
+
+@pytest.mark.slow
+def test_multigrid_solves_the_flow_around_a_ball_that_falls_in_a_tube(tmp_path):
+    """It is fast at first, so that the flow is extended to three layers: incomplete factors diverged there."""
+    (tmp_path / "case.yaml").write_text(BALL)
+    scheme = build(load_case(tmp_path / "case.yaml"), MPI.COMM_SELF, Timer()).scheme
+    notes, depth = [], 0
+    for _, info in march(scheme, 1.0, 2):
+        notes += info.notes
+        depth = max(depth, scheme.coupled.flow.cut.depth)
+    assert depth >= 2
+    assert notes == []
+    assert scheme.coupled.flow.iterative.sequence.current == "multigrid"

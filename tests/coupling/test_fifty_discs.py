@@ -10,11 +10,12 @@ from fsci.builder.build import build
 from fsci.builder.rigid_contact import STANDOFF
 from fsci.case import load_case
 from solvers.march import march
+from solvers.rigid import motion
 from solvers.timing import Timer
 
 RADIUS = 0.045
 HEAD = """\
-time: {step: 0.005, end: 1}
+time: {step: 0.005, end: 2}
 fluid:
   density: 1
   viscosity: 0.005
@@ -66,6 +67,23 @@ def test_fifty_discs_fall_on_each_other(tmp_path, step):
     weight = sum(10.0 * body.inertia.mass for body in bodies.bodies)
     assert momentum < 1e-6 * weight
     assert touched >= 20
+
+
+@pytest.mark.slow
+def test_fifty_discs_come_to_rest(tmp_path):
+    """They brace each other: 89 vertices touch, with friction. At rest contact carries their weight less buoyancy."""
+    found = simulation(tmp_path, range(50), 0.01)
+    bodies = found.scheme.coupled.solid
+    for _, info in march(found.scheme, 1.65, 165):
+        assert overlap(bodies) < 1e-6 * RADIUS
+        assert info.iterations <= 8
+    pairs = list(zip(bodies.bodies, bodies.now, strict=True))
+    fallen = -sum(10.0 * body.inertia.mass * now.shift[1] for body, now in pairs)
+    assert sum(motion.kinetic_energy(body, now) for body, now in pairs) < 1e-12 * fallen
+    immersed = 10.0 * (1.0 - 1.0 / 20.0) * sum(body.inertia.mass for body in bodies.bodies)
+    up = sum(info.numbers[f"contact.on_d{k}.y"] for k in range(50))
+    assert up == pytest.approx(immersed, rel=1e-4)  # the fluid still moves
+    assert up + bodies.on_surface[:, 1].sum() == pytest.approx(immersed / 0.95, rel=1e-9)
 
 
 @pytest.mark.slow

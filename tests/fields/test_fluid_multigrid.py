@@ -118,17 +118,17 @@ def test_iterations_do_not_grow():
 def test_a_cycle_follows_the_matrix_that_multiplies():
     """One for rounded products, then one without for another matrix with the same pattern: the same as a new one."""
     fluid = flow_around_a_ball(uniform([-2.0] * 3, [2.0] * 3, [10] * 3), "iterative")
-    matrix, held, near = fluid.linearise(), fluid.iterate.held, fluid.system.dofs_near_surfaces
+    matrix, held = fluid.linearise(), fluid.iterate.held
     used, new = (Multigrid(MPI.COMM_SELF, fluid.unknowns) for _ in range(2))
     rounded = RoundedProducts().of(matrix, 1e-3)
     assert rounded.handle != matrix.handle
     b, x = matrix.createVecs()
     b.array[:] = np.where(held, 0.0, np.arange(len(held)) % 7)
-    used.preconditioner(matrix, held, near, rounded).apply(b, x)
+    used.preconditioner(matrix, held, fluid.system, rounded).apply(b, x)
     matrix.scale(2.0)
     found = []
     for levels in (used, new):
-        levels.preconditioner(matrix, held, near).apply(b, x)
+        levels.preconditioner(matrix, held, fluid.system).apply(b, x)
         found.append(x.array.copy())
     assert np.array_equal(*found)
 

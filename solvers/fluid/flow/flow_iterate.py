@@ -125,9 +125,8 @@ class FlowIterate:
         b.array[:] = -self.rows
         try:
             with self._timer("solve"):
-                near = self._system.dofs_near_surfaces
                 self.linear_iterations = solver.solve(
-                    matrix, b, x, self.held, near, added=self.added_product(), reduction=reduction
+                    matrix, b, x, self.held, self._system, added=self.added_product(), reduction=reduction
                 )
         except linear.LinearSolveFailed as failure:
             raise StepFailed("fluid", failure.kind, str(failure), where=self.worst()) from failure
@@ -139,8 +138,7 @@ class FlowIterate:
 
     def multigrid(self, matrix: PETSc.Mat, product: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent, which it multiplies by `product`; the next call overwrites it."""
-        near = self._system.dofs_near_surfaces
-        return self.solver.create_multigrid().preconditioner(matrix, self.held, near, product)
+        return self.solver.create_multigrid().preconditioner(matrix, self.held, self._system, product)
 
     def product(self, matrix: PETSc.Mat, reduction: float) -> PETSc.Mat:
         """The tangent as it multiplies vectors in a Krylov method; the next call overwrites it.

@@ -213,6 +213,12 @@ class FlowSystem:
         around = np.flatnonzero(blocks[self.unknowns.cell_blocks].any(axis=1)).astype(np.int32)
         return self.dofs_of(around)[: self.unknowns.owned]
 
+    def dofs_behind_surfaces(self) -> NDArray[np.bool_]:
+        """Mask of the owned dofs of cells behind surfaces to which the flow is extended alone (collective)."""
+        assert self.cut is not None
+        behind, with_fluid = self.cut.strip, np.concatenate([self.cut.cut, self.cut.uncut])
+        return (self.dofs_of(behind) & ~self.dofs_of(with_fluid))[: self.unknowns.owned]
+
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Mask of the local dofs that belong to some cells; every process passes its local ones (collective)."""
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)

@@ -17,7 +17,7 @@ from solvers.algebra.lagged import Lagged, LaggedFactors
 from solvers.algebra.rounded_product import RoundedProducts
 from solvers.api import Array
 from solvers.fluid.mesh.space import Unknowns
-from solvers.fluid.solve.linear_systems.multigrid import Marker, Multigrid
+from solvers.fluid.solve.linear_systems.multigrid import Multigrid, Surfaces
 
 #: Names of the methods in messages.
 IN_WORDS: dict[linear.FlowMethod, str] = {
@@ -132,15 +132,15 @@ class FlowSolver:
         b: PETSc.Vec,
         x: PETSc.Vec,
         held: NDArray[np.bool_],
-        near: Marker,
+        surfaces: Surfaces,
         *,
         added: Callable[[Array], Array] | None = None,
         reduction: float = 0.0,
     ) -> int:
         """Solve (matrix + added) x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
 
-        held: owned unknowns whose rows are those of the identity; near: marks those near surfaces; added: a part of low
-        rank as a product with vectors; reduction: of the residual that is good enough.
+        held: owned unknowns whose rows are those of the identity; added: a part of low rank as a product with vectors;
+        reduction: of the residual that is good enough.
         """
 
         def whole(product: PETSc.Mat) -> PETSc.Mat:
@@ -153,17 +153,17 @@ class FlowSolver:
                 iterations = self._krylov.solve_again(whole(product), b, x, reduction=reduction)
                 if iterations is not None:
                     return iterations
-                ksp = self._create(matrix, held, near, product)
+                ksp = self._create(matrix, held, surfaces, product)
                 return self._krylov.solve(ksp, whole(product), b, x, matrix, reduction=reduction)
             except linear.LinearSolveFailed as failure:
                 self.sequence.advance(failure)
         return self._direct.solve(whole(matrix), b, x, matrix)
 
-    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker, product: PETSc.Mat) -> PETSc.KSP:
+    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], surfaces: Surfaces, product: PETSc.Mat) -> PETSc.KSP:
         comm, method = self.sequence.comm, self.sequence.current
         if not self.sequence.multigrid:
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
         self.sequence.limit(ksp)
-        ksp.setPC(self.create_multigrid().preconditioner(matrix, held, near, product))
+        ksp.setPC(self.create_multigrid().preconditioner(matrix, held, surfaces, product))
         return ksp
