@@ -8,7 +8,7 @@ Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
