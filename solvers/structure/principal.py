@@ -9,7 +9,6 @@ all laws. At other points, for output, the stress is interpolated from the nodes
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -71,6 +70,7 @@ class PrincipalStretches:
         self._gradient = fem.compile_expression(in_space(F), points)
         self._terms = law.moduli(fem.cell_midpoints(domain)[:, :owned])
         self._present: Spectral | None = None
+        self._nodal_stress: tuple[list[Any], Any] | None = None
         self._F = F
         self.update()
 
@@ -106,19 +106,20 @@ class PrincipalStretches:
 
     def at_any_point(self, expression: Tensor) -> Tensor:
         """The same with the stress interpolated from nodes, after `prepare_output`."""
-        stress = ufl.as_tensor(np.reshape(self._at_nodes[0], (3, 3)).tolist())
+        stress = ufl.as_tensor(np.reshape(self._create_nodal_stress()[0], (3, 3)).tolist())
         return ufl.replace(self.without_tangent(expression), {self._fields[2]: stress})
 
-    @cached_property
-    def _at_nodes(self) -> tuple[list[Any], Any]:
-        """Entries of the stress by rows, as polynomials in each cell, and F at their nodes."""
-        space = fem.broken_space(self._domain)
-        nodes = fem.reference_nodes(self._domain)
-        return [fem.function(space) for _ in range(9)], fem.compile_expression(in_space(self._F), nodes)
+    def _create_nodal_stress(self) -> tuple[list[Any], Any]:
+        """Entries of the stress by rows, as polynomials in each cell, and F at their nodes; once."""
+        if self._nodal_stress is None:
+            space, nodes = fem.broken_space(self._domain), fem.reference_nodes(self._domain)
+            entries = [fem.function(space) for _ in range(9)]
+            self._nodal_stress = entries, fem.compile_expression(in_space(self._F), nodes)
+        return self._nodal_stress
 
     def prepare_output(self) -> None:
         """The stress at the nodes of all cells."""
-        entries, gradient = self._at_nodes
+        entries, gradient = self._create_nodal_stress()
         blocks = fem.cell_blocks(entries[0].function_space)[: len(self._blocks[0])]
         _, found = self._at(gradient, blocks.shape[1])
         for entry, values in zip(entries, found.stress.reshape(-1, 9).T, strict=True):
