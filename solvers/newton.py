@@ -118,7 +118,10 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
         residual = _residual(system)
         infinite = ~np.isfinite(residual)  # elements are inverted; it counts twice
-        risen += [rise for rise in ((residual > largest) & (residual > small), infinite, infinite) if rise.any()]
+        rise = (residual > largest) & (residual > small)
+        if rise.any():  # noise of parts that are solved must not hold up others
+            rise &= ~system.only_rounding()
+        risen += [mask for mask in (rise, infinite, infinite) if mask.any()]
         if (tolerance.line_search and settled) or (number > 0 and system.astray(risen)):
             increment, residual = _halve(system, before, small, increment, residual)
         ratio = residual / np.maximum(before, ZERO_RESIDUAL)

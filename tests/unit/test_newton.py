@@ -232,6 +232,25 @@ def test_rounding_of_one_part_does_not_shorten_the_increments_of_another():
     assert info.iterations == converge(root_of_two(), Tolerance(1e-10)).iterations
 
 
+class Watching(Together):
+    """Keeps the parts whose residuals rose last."""
+
+    def astray(self, risen=()):
+        self.risen = list(risen)
+        return ""
+
+
+@pytest.mark.parametrize(("round_off", "rises"), [(1e9, 0), (0.0, 4)])
+def test_rounding_errors_that_grow_are_no_rise(round_off, rises):
+    """A part that rises may need shorter increments, for all parts; one whose residual is noise does not."""
+    growing = Scalar(lambda x: math.exp(x), lambda x: -math.exp(x), 1.0, force=1e-3, round_off=round_off)
+    system = Watching(growing, root_of_two())
+    for iterate in iterates(system, Tolerance(1e-10)):
+        if iterate.number == 4:
+            break
+    assert [mask[0] for mask in system.risen] == [True] * rises
+
+
 def test_a_part_that_fails_is_reported():
     """x^2 + 1 = 0 beside a part that has converged, and one whose residual is rounding error."""
     noise = Scalar(lambda x: 1e6, lambda x: 1e300, 1.0, round_off=2e6)
