@@ -40,7 +40,8 @@ DOCS_STAMP     := .venv/docs.stamp
 MODULES        := .venv/modules.txt
 KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp solvers/kernels/*.map)
 VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel nodal_normals mortar_derivatives structure_patch \
-  fluid_patch contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
+  fluid_patch contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run \
+  ogden
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
 .PHONY: setup demo test test-slow test-versions test-debian13 coverage lint bench docs links clean FORCE
