@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fsci.case import Case
@@ -10,8 +12,10 @@ from solvers.api import Array
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh
 from solvers.structure.elastic_constants import lambda_of_bulk, poisson
-from solvers.structure.elements import Formulation
 from solvers.values import evaluate
+
+if TYPE_CHECKING:
+    from solvers.structure.elements import Formulation
 
 #: Poisson's ratio from which on the error of first-order displacement elements in bending is over twice that at 0.3.
 LOCKING = 0.45

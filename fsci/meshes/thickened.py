@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from fsci.meshes.jacobians import inverted
 from solvers.mesh.cell_types import CELL_TYPES
@@ -88,6 +86,9 @@ def _facing_alike(nodes: Array, facets: Indices) -> Indices:
 
     Each facet stands for two things, itself and itself turned round; neighbours link those that face alike.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     sides, forward = _ends(facets)
     keys, number, times = np.unique(sides.reshape(-1, sides.shape[2]), axis=0, return_inverse=True, return_counts=True)
     if (times > 2).any():
@@ -167,12 +168,15 @@ def _surfaces(mesh: Mesh, count: int, layers: int, rims: Mapping[str, Indices]) 
     on_top, on_bottom = (level == layers).all(axis=1), (level == 0).all(axis=1)
     beside = ~(on_top | on_bottom)
     found = {"top": facets[on_top], "bottom": facets[on_bottom], "edge": facets[beside]}
-    ends = np.column_stack([node[beside].min(axis=1), node[beside].max(axis=1)])
+    ends = _pairs(node[beside], count)
     for name, of in rims.items():
-        wanted = np.column_stack([of.min(axis=1), of.max(axis=1)])
-        among = (ends[:, None] == wanted).all(axis=2).any(axis=1) if len(wanted) else np.zeros(len(ends), dtype=bool)
-        found[name] = found["edge"][among]
+        found[name] = found["edge"][np.isin(ends, _pairs(of, count))]
     return {name: of for name, of in found.items() if len(of)}
+
+
+def _pairs(nodes: Indices, count: int) -> Indices:
+    """A number for the lowest and the highest of the nodes in each row."""
+    return nodes.min(axis=1, initial=count) * (count + 1) + nodes.max(axis=1, initial=-1)
 
 
 def _second_order(mesh: Mesh, name: str) -> Mesh:

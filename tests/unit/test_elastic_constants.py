@@ -44,6 +44,7 @@ def test_constants_are_those_of_the_law(law):
     others = {
         "mooney_rivlin": {"c10": 20.0, "c01": 10.0, "bulk": 120.0},
         "yeoh": {"c10": 30.0, "c20": 5.0, "bulk": 120.0},
+        "ogden": {"terms": [{"mu": 40.0, "alpha": 2.5}, {"mu": -10.0, "alpha": -2.0}], "bulk": 120.0},
         "holzapfel_gasser_ogden": {"mu": 60.0, "k1": 0.0, "k2": 1.0, "fibres": [[1, 2, 3]], "bulk": 120.0},
     }
     settings = TypeAdapter(Material).validate_python({"law": law, **others.get(law, {"E": E, "nu": NU})})
