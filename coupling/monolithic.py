@@ -220,9 +220,9 @@ class Monolithic:
         return np.concatenate([solid.update(increment[:own]), flow.update(increment[own:])])
 
     def _corrected(self, increment: Array) -> Array:
-        """The increment of both parts, corrected by a secant once stabilisation of a steady flow and contact stay."""
+        """The increment of both parts, corrected by a secant once a steady flow is near and contact stays."""
         solid, flow = self.coupled.solid, self.coupled.flow
-        if not flow.steady or flow.equations_change:
+        if not flow.steady or flow.far:
             return increment
         if not solid.settled():
             self._secant.forget()

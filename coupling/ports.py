@@ -214,8 +214,8 @@ class Flow(Part, Protocol):
         ...
 
     @property
-    def equations_change(self) -> bool:
-        """Whether the equations of a steady flow change from iterate to iterate, such as scales of stabilisation."""
+    def far(self) -> bool:
+        """Whether a steady flow is too far from the solution for Newton's method."""
         ...
 
     @property

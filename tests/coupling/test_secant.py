@@ -50,7 +50,7 @@ def test_no_change_is_no_division():
 
 
 def test_steady_flag_converges_fast_in_the_end():
-    """FSI1 on half of its cells: 10 steps; without the secant 24, of which the last 17 halve the residual."""
+    """FSI1 on half of its cells: 9 steps; without the secant 24, of which the last 17 halve the residual."""
     case = load_case(CASES / "fsi1", [(name, str(value)) for name, value in grid_fsi1(0.5).items()])
     scheme = build(case, MPI.COMM_WORLD, Timer()).scheme
     scheme.initialise(0.0, 1.0)

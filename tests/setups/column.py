@@ -26,7 +26,7 @@ class Column:
     """Implements `Flow` on one process: a column along x in front of the facets of a surface that look there."""
 
     name, size, steady, renewals, times = "column", 2, False, 0, 2
-    equations_change, iterative, longest_step = False, None, math.inf
+    far, iterative, longest_step = False, None, math.inf
 
     def __init__(self, surface: str, points, facets, *, density: float, length: float, velocity: float = 0.0):
         """velocity: of column and wall at the start [m/s]."""

@@ -156,9 +156,9 @@ class Fluid:
         return self.history.longest_step
 
     @property
-    def equations_change(self) -> bool:
-        """Whether scales of the stabilisation of a steady flow still follow the iterate."""
-        return self.steady_iteration.scales_follow
+    def far(self) -> bool:
+        """Whether a steady flow is too far from the solution for Newton's method."""
+        return self.steady and self.steady_iteration.far
 
     @property
     def iterative(self) -> FlowIterate:
@@ -372,7 +372,7 @@ class Fluid:
     @property
     def _picard(self) -> bool:
         """Whether the tangent is that of Picard's method."""
-        return bool(self.steady and self.settings.convection and self.steady_iteration.far)
+        return bool(self.settings.convection and self.far)
 
     def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
         """One iteration of Newton's method; returns the increment relative to the solution. Raises StepFailed.
