@@ -29,6 +29,9 @@ from solvers.fluid.grid.box import Grid
 #: dimension: where the two amplifications above are equal for the worst plane, which cuts off a corner. (For
 #: polynomials of first degree 0.69 and 0.79.)
 FREE_SHARE = {2: 0.7, 3: 0.81}
+#: Share up to which the penalty on the distance to the extension has its full weight. Drags are the same to 1e-4 from
+#: 0.05 to 0.4.
+PENALISED_SHARE = 0.2
 
 #: Layers of cells around those of a node that count as nearby.
 LAYERS_NEARBY = 2
@@ -49,7 +52,7 @@ class Dependent:
 
     nodes: Indices
     rows: sparse.csr_matrix  #: E, shape (dependent nodes, nodes of the lattice)
-    weight: Array  #: of the distance to the extension: 1 without fluid, decreasing to 0 at free nodes
+    weight: Array  #: of the distance to the extension: 1 for small shares of fluid, decreasing to 0 at free nodes
     dry: NDArray[np.bool_]  #: nodes whose cells have no fluid: their values are those of the extension
     undetermined: Indices  #: nodes of active cells with no root
 
@@ -230,8 +233,8 @@ def lagrange(s: Array, degree: int) -> Array:
 
 
 def _weight(relative: Array, free: float) -> Array:
-    """Weight of the penalty: a cubic from 1 without fluid to 0 at `free` with zero slope at both."""
-    s = np.clip(1.0 - relative / free, 0.0, 1.0)
+    """Weight of the penalty: a cubic from 1 at PENALISED_SHARE to 0 at `free` with zero slope at both."""
+    s = np.clip((free - relative) / (free - PENALISED_SHARE), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
