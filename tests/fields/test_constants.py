@@ -196,17 +196,16 @@ def drag_in_films():
 def test_walls_of_a_film(monkeypatch):
     """Parallel up to 45 or up to 90 degrees is the same; up to 8 degrees a film that curves is found in part only.
 
-    The force across then is 15 % larger, the drag 0.44 % lower. Up to 2.6 degrees no film is found, and the drag is
-    30 % lower.
+    The drag then is 0.8 % lower. It was more than 5 % before cells at the ends of films had creeping flow.
     """
     wanted = drag_in_films()
     for opposite in (-0.01, -0.3, -0.7):
         monkeypatch.setattr(film, "OPPOSITE", opposite)
         assert drag_in_films() == pytest.approx(wanted, rel=2e-4)
     monkeypatch.setattr(film, "OPPOSITE", -0.99)
-    assert drag_in_films()[1] < 1.1 * wanted[1]  # both are negative
-    monkeypatch.setattr(film, "OPPOSITE", -0.999)
-    assert drag_in_films()[0] < 0.995 * wanted[0]
+    drag, force = drag_in_films()
+    assert drag < 0.995 * wanted[0]
+    assert force < 1.1 * wanted[1]  # both are negative
 
 
 def drags_of_films():
