@@ -39,6 +39,10 @@ SMALLER = {
     "torus_rough": ["fluid.grid.cells=[12, 6, 20]", "structure.bodies.torus.mesh.cells=[12, 12]"],
     "sphere_tube": ["structure.bodies.tube.mesh.cells=[24, 1, 30]", "structure.bodies.sphere.mesh.cells=[5, 1]"],
     "thin_flag": ["fluid.grid.cells=[42, 14]"],
+    "leaflet_pulsating": [
+        "fluid.grid.x=[{to: 0.8, cells: 6, ratio: 0.4}, {to: 1.5, cells: 12}, {to: 8, cells: 20, ratio: 15}]",
+        "fluid.grid.y=[{to: 1, cells: 16}]",
+    ],
     "hopper": ["fluid.grid.cells=[20, 32]", "solver.newton.residual=1e-15"],  # the leak sees what the iteration leaves
     "elastic_tube": ["fluid.grid.cells=[4, 4, 16]", "structure.bodies.wall.mesh.cells=[8, 1, 20]"],
     "falling_sphere": [
@@ -69,7 +73,7 @@ PARALLEL = (
 
 #: what the whole runs of cases take, where it is long [s]
 SECONDS = {
-    "cavity_flexible_bottom": 55, "cylinder_2d2": 200, "elastic_tube": 90, "flap": 90, "torus_rough": 150,
+    "cavity_flexible_bottom": 55, "cylinder_2d2": 200, "elastic_tube": 90, "flap": 90, "leaflet_pulsating": 300, "torus_rough": 150,
     "torus_wall": 65, "two_tori_friction": 80,
 }  # fmt: skip
 
