@@ -295,10 +295,10 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 
 def _notes(case: Case, bodies: list[Body]) -> list[str]:
-    from fsci.builder.elements import element_note, locking_warning
+    from fsci.builder.elements import choose_element
 
     meshes = {body.name: body.domain.source for body in bodies if body.domain.source is not None}
     notes = [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes.items() if mesh.note]
-    notes += [f"body '{name}': {note}" for name, mesh in meshes.items() if (note := element_note(case, name, mesh))]
-    locking = [(name, locking_warning(case, name, mesh)) for name, mesh in meshes.items()]
-    return notes + [f"warning: body '{name}': {words}" for name, words in locking if words]
+    chosen = {name: choose_element(case, name, mesh) for name, mesh in meshes.items()}
+    notes += [f"body '{name}': {one.note}" for name, one in chosen.items() if one.note]
+    return notes + [f"warning: body '{name}': {one.warning}" for name, one in chosen.items() if one.warning]

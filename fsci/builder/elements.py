@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,13 +22,30 @@ if TYPE_CHECKING:
 LOCKING = 0.45
 
 
-def choose_element(case: Case, name: str, mesh: Mesh) -> Formulation:
+@dataclass(frozen=True)
+class ChosenElement:
+    """The element of a body, and what to say of it."""
+
+    element: Formulation
+    note: str = ""  #: that the program has chosen the mixed one
+    warning: str = ""  #: that its cells lock
+
+
+def choose_element(case: Case, name: str, mesh: Mesh) -> ChosenElement:
     """The element of a body with this mesh: what its case says, else by Poisson's ratio. Raises CaseError."""
-    settings = case.elastic_bodies[name]
-    if settings.element != "auto":
-        return settings.element
-    simplices = CELL_TYPES[mesh.cell_type].shape.simplex
-    return "displacement" if simplices or nearly_incompressible(case, name, mesh) is None else "mixed"
+    given = case.elastic_bodies[name].element
+    if given == "mixed":
+        return ChosenElement("mixed")
+    if (nu := nearly_incompressible(case, name, mesh)) is None:
+        return ChosenElement("displacement")
+    kind = CELL_TYPES[mesh.cell_type]
+    if given == "auto" and not kind.shape.simplex:
+        return ChosenElement("mixed", note=f"mixed element for nearly incompressible material (nu = {nu:.4g})")
+    if kind.degree > 1:
+        return ChosenElement("displacement")
+    remedy = "take 'order: 2'" if kind.shape.simplex else "take 'element: auto'"
+    locks = f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); {remedy}"
+    return ChosenElement("displacement", warning=locks)
 
 
 def nearly_incompressible(case: Case, name: str, mesh: Mesh) -> float | None:
@@ -37,24 +55,6 @@ def nearly_incompressible(case: Case, name: str, mesh: Mesh) -> float | None:
         return None
     nu = float(np.max(poisson(*lame_at_cells(case, name, mesh))))
     return nu if nu >= LOCKING else None
-
-
-def element_note(case: Case, name: str, mesh: Mesh) -> str:
-    """That the program has chosen the mixed element for a body, else an empty text. Raises CaseError."""
-    if case.elastic_bodies[name].element != "auto" or choose_element(case, name, mesh) == "displacement":
-        return ""
-    return f"mixed element for nearly incompressible material (nu = {nearly_incompressible(case, name, mesh):.4g})"
-
-
-def locking_warning(case: Case, name: str, mesh: Mesh) -> str:
-    """That the cells of a body lock, else an empty text. Raises CaseError."""
-    kind = CELL_TYPES[mesh.cell_type]
-    if kind.degree > 1 or choose_element(case, name, mesh) == "mixed":
-        return ""
-    if (nu := nearly_incompressible(case, name, mesh)) is None:
-        return ""
-    remedy = "take 'order: 2'" if kind.shape.simplex else "take 'element: auto'"
-    return f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); {remedy}"
 
 
 def lame_at_cells(case: Case, name: str, mesh: Mesh) -> tuple[Array, Array]:

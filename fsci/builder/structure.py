@@ -103,7 +103,7 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
             meshes = {name: read_body(case, name) for name in case.elastic_bodies}
             locations = {name: find_locations(case, name, mesh) for name, mesh in meshes.items()}
             _require_own_laws(case, meshes)
-            elements = {name: choose_element(case, name, mesh) for name, mesh in meshes.items()}
+            elements = {name: choose_element(case, name, mesh).element for name, mesh in meshes.items()}
             if case.contact is not None:
                 from fsci.builder.adjust import adjusted
                 from fsci.builder.tied import join_tied

@@ -138,15 +138,16 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
 
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in coarse(case, bodies)]
     if case.elastic_bodies:
-        from fsci.builder.elements import element_note, locking_warning
+        from fsci.builder.elements import choose_element
         from fsci.builder.wall_pairs import wall_pairs
         from fsci.check.stiff_slaves import stiff_slaves
         from fsci.check.unpaired import unpaired
 
         for name in case.elastic_bodies:
             place, mesh = case.place("structure", "bodies", name, "mesh"), found.meshes[name]
-            found.notes += [f"{place}: {words}" for words in [element_note(case, name, mesh)] if words]
-            found.warnings += [f"{place}: {words}" for words in [locking_warning(case, name, mesh)] if words]
+            chosen_element = choose_element(case, name, mesh)
+            found.notes += [f"{place}: {words}" for words in [chosen_element.note] if words]
+            found.warnings += [f"{place}: {words}" for words in [chosen_element.warning] if words]
         for pair in wall_pairs(case, {name: found.meshes[name] for name in case.elastic_bodies}):
             found.walls.setdefault(pair.body, []).append(pair.name)
 

@@ -3,7 +3,7 @@
 import pytest
 from programs import fsci
 
-from fsci.builder.elements import choose_element, element_note, locking_warning
+from fsci.builder.elements import choose_element
 from fsci.case import load_case
 from fsci.meshes.of_case import read_body
 from fsci.running.history import read_history
@@ -32,8 +32,8 @@ def chosen(folder, *changes):
     (folder / "case.yaml").write_text(BEAM)
     settings = [change if "." in change.split("=")[0] else f"structure.bodies.beam.{change}" for change in changes]
     case = load_case(folder, [tuple(setting.split("=", 1)) for setting in settings])
-    mesh = read_body(case, "beam")
-    return choose_element(case, "beam", mesh), element_note(case, "beam", mesh), locking_warning(case, "beam", mesh)
+    found = choose_element(case, "beam", read_body(case, "beam"))
+    return found.element, found.note, found.warning
 
 
 @pytest.mark.parametrize(
