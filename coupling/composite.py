@@ -241,8 +241,8 @@ class Composite:
         relative = [_relative(r, part.forces()) for r, part in zip(self._residuals, self.parts, strict=True)]
         return places[int(np.argmax(relative))]
 
-    def few(self) -> Indices:
-        return np.concatenate([part.few() for part in self.parts])
+    def rigid_unknowns(self) -> Indices:
+        return np.concatenate([part.rigid_unknowns() for part in self.parts])
 
     def row_transformations(self) -> list[RowTransformation]:
         elastic = self.elastic.row_transformations()

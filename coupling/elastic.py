@@ -207,7 +207,7 @@ class Elastic:
         """Whether contact changes the rows at this iterate."""
         return self.structure.constraint is not None and self.structure.constraint.near
 
-    def few(self) -> Indices:
+    def rigid_unknowns(self) -> Indices:
         return np.empty(0, dtype=np.int64)
 
     def row_transformations(self) -> list[RowTransformation]:

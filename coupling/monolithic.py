@@ -257,7 +257,7 @@ class Monolithic:
             tolerance=flow.linear_tolerance,
             fill=sequence.current == "fill",
             flow=of_flow_alone,
-            few=self.coupled.solid.few(),
+            few=self.coupled.solid.rigid_unknowns(),
             levels=flow.free_levels(),
         )
         sequence.limit(krylov)

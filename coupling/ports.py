@@ -144,7 +144,7 @@ class Solid(Part, Protocol):
         """Energy [J] that has changed its form or its body so far: half of the sum of all |changes| and works."""
         ...
 
-    def few(self) -> Indices:
+    def rigid_unknowns(self) -> Indices:
         """Numbers of free unknowns that move whole surfaces, for preconditioners; the same on all processes."""
         ...
 

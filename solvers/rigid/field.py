@@ -438,7 +438,7 @@ class RigidBodies:
 
     # ------------------------------------------------------------------------------------- rows of a larger system
 
-    def few(self) -> Indices:
+    def rigid_unknowns(self) -> Indices:
         """Numbers of all unknowns that are not held."""
         return self.first + np.flatnonzero(self._free)
 

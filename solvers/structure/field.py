@@ -147,7 +147,6 @@ class Structure:
             self.constraint.present = self.constraint.find_present(u, v, t, dt)
             self.forget_mass()
         self._assemble_bodies()
-        self.now.loads += self.springs.force(self)
         if self.constraint is not None:
             self.start_constraint()
         self.time.start(self, t, dt)
@@ -284,7 +283,6 @@ class Structure:
     def assemble(self) -> None:
         """Compute forces at the present displacement."""
         self._assemble_bodies()
-        self.now.loads += self.springs.force(self)
         self._assemble_constraint()
 
     def _assemble_bodies(self) -> None:
@@ -294,6 +292,7 @@ class Structure:
             body.set_displacement(u)
             internal[:] = body.internal_force()
             loads[:] = body.external_force(self.current.t)
+        now.loads += self.springs.force(self)
         self.inertia.find_frame(now.u)
 
     def _assemble_constraint(self) -> None:
@@ -306,12 +305,11 @@ class Structure:
 
     def residual(self) -> Array:
         """Norm [N] of the balance at the free dofs and of the residual of the constraint, by piece."""
+        self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         with self.timer("assembly"):
             self._assemble_bodies()
         with self.timer("contact"):
             self._assemble_constraint()
-        self.now.v, self.now.a = self.time.motion(self, self.current.dt)
-        self.now.loads += self.springs.force(self)
         self.now.rigid = self.time.rigid_force(self, self.current.dt)
         if self.damping is not None:
             self.now.damping = self.damping.force(self.now.v)
