@@ -264,6 +264,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         probes=joined(probes),
         balances=lambda: {**watched.numbers(), **scheme.coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
+        notes=_notes(case, []),
         sentinels={
             **build_sentinels(case, comm, rigid=bodies, given=fluid.bodies),
             **watched.sentinels,
@@ -290,15 +291,19 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=watched.numbers,
         sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs()},
+        notes=_notes(case, []),
         resolution=partial(measure, fluid),
     )
 
 
 def _notes(case: Case, bodies: list[Body]) -> list[str]:
     from fsci.builder.elements import choose_element
+    from fsci.case.flow_element import flow_element
 
     meshes = {body.name: body.domain.source for body in bodies if body.domain.source is not None}
     notes = [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes.items() if mesh.note]
     chosen = {name: choose_element(case, name, mesh) for name, mesh in meshes.items()}
     notes += [f"body '{name}': {one.note}" for name, one in chosen.items() if one.note]
+    if case.fluid is not None and (flow := flow_element(case)).why:
+        notes.append(f"flow: element {flow}")
     return notes + [f"warning: body '{name}': {one.warning}" for name, one in chosen.items() if one.warning]

@@ -14,6 +14,7 @@ from fsci.builder.on_first import shared
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.contact import FilmSection
+from fsci.case.flow_element import flow_element
 from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import finite, rigid_motion
@@ -48,7 +49,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     bodies = [_with_layer(case, body) for body in bodies]
-    grid, flow, patches = _grid(case, comm), _flow(settings), _patches(settings)
+    grid, flow, patches = _grid(case, comm), _flow(case), _patches(settings)
     follows = following(case) if settings.grid.refine else None
     try:
         return Fluid(grid, flow, patches, bodies, solver, following=follows, timer=timer, comm=comm)
@@ -64,7 +65,9 @@ def _grid(case: Case, comm: MPI.Comm) -> Grid:
     return shared(comm, lambda: read_grid(case))
 
 
-def _flow(settings: FluidSection) -> FlowSettings:
+def _flow(case: Case) -> FlowSettings:
+    assert case.fluid is not None
+    settings = case.fluid
     viscosity, shear = settings.viscosity, None
     if settings.shear is not None:
         viscosity, shear = settings.shear.of(viscosity)
@@ -72,7 +75,7 @@ def _flow(settings: FluidSection) -> FlowSettings:
         density=settings.density,
         viscosity=viscosity,
         shear=shear,
-        element=settings.element,
+        element=flow_element(case).element,
         convection=settings.flow == "navier_stokes",
         scheme=settings.scheme,
         body_force=_body_force(settings),

@@ -251,8 +251,10 @@ class FluidSection(Section):
         "time integration; bdf2_optimized: half of the error of bdf2 and hardly any damping, twice the noise of moving "
         "bodies; steady: every step computes the steady flow for the boundary conditions of its time",
     )
-    element: Literal["q1q1", "q2q1"] = setting(
-        "q1q1", "q1q1: velocity and pressure of first order; q2q1: velocity of second order"
+    element: Literal["auto", "q1q1", "q2q1"] = setting(
+        "auto",
+        "q1q1: velocity and pressure of first order; q2q1: velocity of second order; auto: q2q1, but q1q1 where "
+        "elastic bodies may touch something in the flow, and with 'narrow_gaps'",
     )
     narrow_gaps: bool = setting(
         False,
@@ -273,7 +275,7 @@ class FluidSection(Section):
 
     @model_validator(mode="after")
     def _gaps_of_first_order(self) -> FluidSection:
-        if self.narrow_gaps and self.element != "q1q1":
+        if self.narrow_gaps and self.element == "q2q1":
             raise fault("is for q1q1; q2q1 has the flow through narrow gaps without it", "narrow_gaps")
         return self
 
@@ -283,10 +285,9 @@ class FluidSection(Section):
         found = {name: body.free for name, body in self.bodies.items() if body.free is not None}
         return {name: free.with_gravity(self.gravity) for name, free in found.items()}
 
-    @property
-    def dofs(self) -> int:
-        """Unknowns of velocity and pressure, those inside bodies included."""
-        dim, degree = self.grid.dimension, 1 if self.element == "q1q1" else 2
+    def dofs(self, degree: int) -> int:
+        """Unknowns of velocities of this degree and of pressure, those inside bodies included."""
+        dim = self.grid.dimension
         velocity = pressure = 1
         for cells in self.grid.shape:
             velocity, pressure = velocity * (degree * cells + 1), pressure * (cells + 1)

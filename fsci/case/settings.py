@@ -8,6 +8,7 @@ from typing import Any
 
 from fsci.case.case import Case
 from fsci.case.curve import Curve
+from fsci.case.flow_element import flow_element
 from fsci.case.mesh import FileMesh
 from fsci.case.section import Section
 from fsci.expression import Expression
@@ -26,8 +27,11 @@ _WIDTH = 60
 
 
 def settings_of(case: Case) -> Settings:
-    """The settings of a case. Files count by what the case has read from them, and meshes not at all."""
+    """The settings of a case. Files count by what the case has read from them, and meshes not at all; the element of
+    the flow is the one that the case has."""
     found: Settings = _plain(case)
+    if case.fluid is not None:
+        found["fluid"]["element"] = flow_element(case).element
     return found
 
 

@@ -7,6 +7,7 @@ from textwrap import wrap
 
 from fsci.case import Case
 from fsci.case.contact import Friction, PairSection
+from fsci.case.flow_element import flow_element
 from fsci.case.fluid import FluidSection
 from fsci.case.mesh import Mesh
 from fsci.case.probe_checks import CONTACT_COLUMNS, FRICTION_COLUMNS, known_columns
@@ -119,7 +120,7 @@ def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) 
 
 def _fluid(case: Case, fluid: FluidSection) -> Iterator[Row]:
     flow = "Navier-Stokes" if fluid.flow == "navier_stokes" else "Stokes"
-    yield "fluid", f"{flow}, {fluid.scheme.replace('_', ' ')}, {fluid.element}"
+    yield "fluid", f"{flow}, {fluid.scheme.replace('_', ' ')}, {flow_element(case)}"
     cells = " x ".join(f"{count:,}" for count in fluid.grid.shape)
     box = " x ".join(f"[{low:g}, {high:g}]" for low, high in zip(fluid.grid.start, fluid.grid.to, strict=True))
     yield "grid", f"{box}, {cells} cells{_finer(case)}"

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fsci.case import Case
+from fsci.case.flow_element import flow_element
 from fsci.check.check import structure_dofs
 from fsci.meshes.nested import fluid_dofs
 from solvers.mesh.mesh import Mesh
@@ -45,7 +46,7 @@ def estimate(case: Case, structure: int | None, table: Table, dimension: int | N
             return None
         parts[f"structure {dim}D"] = structure
     if case.fluid is not None:
-        parts[f"fluid {dim}D {case.fluid.element}"] = fluid_dofs(case)
+        parts[f"fluid {dim}D {flow_element(case).element}"] = fluid_dofs(case)
     if not parts:
         return None  # rigid bodies cost next to nothing
     seconds = {kind: _seconds(table[kind], dofs) for kind, dofs in parts.items()}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
+from fsci.case.flow_element import flow_element
 from fsci.case.fluid import Movement
 from fsci.case.rigid_motion import rigid_motion
 from fsci.check.scene import Keys, Placed, Said
@@ -36,7 +37,7 @@ def coarse(case: Case, bodies: list[Placed]) -> Iterator[Said]:
         for body in at_start(grid, walls, [(body.name, _corners(case, body, t)) for body in placed]):
             if body.body not in case.fluid.bodies:
                 continue
-            for about, text in before_the_run(body, case.fluid.element, films=body.body in films):
+            for about, text in before_the_run(body, flow_element(case).element, films=body.body in films):
                 if about not in said:
                     said.add(about)
                     yield keys[body.body], text

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
+from fsci.case.flow_element import flow_element
 from fsci.case.grid import Refinement
 from fsci.meshes.of_case import read_body, read_rigid_body
 from solvers.fluid.grid.box import Grid
@@ -56,10 +57,10 @@ def cells_of(case: Case) -> int:
 def fluid_dofs(case: Case) -> int:
     """Unknowns of velocity and pressure, those inside of bodies included. Raises CaseError."""
     assert case.fluid is not None
+    degree = flow_element(case).degree
     if not case.fluid.grid.refine:
-        return case.fluid.dofs
+        return case.fluid.dofs(degree)
     grid = _refined(case, Grid(case.fluid.grid.planes))
-    degree = 1 if case.fluid.element == "q1q1" else 2
     return grid.dim * grid.unknowns(degree) + grid.unknowns(1)
 
 

@@ -6,6 +6,7 @@ import os
 from typing import Any
 
 from fsci.case import Case
+from fsci.case.flow_element import flow_element
 from fsci.case.shapes import ShapeSection
 from fsci.case.yaml_text import Keys
 
@@ -24,7 +25,7 @@ def unknowns(case: Case) -> dict[Keys, int]:
         if isinstance(body.mesh, ShapeSection):
             found["structure", "bodies", name, "mesh"] = body.mesh.plan.counts[1] * body.mesh.plan.dimension
     if case.fluid is not None:
-        found["fluid", "grid"] = case.fluid.dofs
+        found["fluid", "grid"] = case.fluid.dofs(flow_element(case).degree)
     return found
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from fsci.builder.on_first import on_first, shared
 from fsci.case import Case, CaseError, load_case
+from fsci.case.flow_element import flow_element
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
 from fsci.resolution.words import resolved, worst_by_body
@@ -297,7 +298,7 @@ class Run:
         with self.record.timer("resolution"):
             found = self.simulation.resolution()
         if found:
-            self.record.note_resolution(resolved(found, self.case.fluid.element))
+            self.record.note_resolution(resolved(found, flow_element(self.case).element))
 
     # ------------------------------------------------------------------------------------------------- files
 

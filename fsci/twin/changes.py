@@ -10,6 +10,7 @@ from typing import Any, Literal
 from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import Case
 from fsci.case.contact import PairSection
+from fsci.case.flow_element import flow_element
 from fsci.case.material import OwnLawSection
 from fsci.case.mesh import FileMesh
 from fsci.meshes.of_case import read_body
@@ -61,7 +62,7 @@ def quick(all_twins: list[Twin]) -> list[Twin]:
 def _elements(case: Case) -> Iterator[Twin]:
     if case.fluid is None:
         return
-    if case.fluid.element == "q2q1":
+    if flow_element(case).element == "q2q1":
         yield Twin("element", "element q1q1", "space", (("fluid.element", "q1q1"),))
         return
     other: Settings = (("fluid.element", "q2q1"), *((("fluid.narrow_gaps", "false"),) * case.fluid.narrow_gaps))

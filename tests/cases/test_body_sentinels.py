@@ -14,6 +14,7 @@ time: {step: 0.02, end: 0.4}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [-1, 0], to: [1, 1.5], cells: [16, 12]}
   patches: {walls: {on: [x-, x+, y-], no_slip: true}, top: {on: y+, traction: [0, 0]}}
@@ -32,6 +33,7 @@ time: {step: 0.02, end: 0.3}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1.2], cells: [10, 12]}
   patches: {top: {on: y+, outflow: true}, walls: {on: [x-, x+, y-], slip: true}}

@@ -27,6 +27,7 @@ structure:
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:
     inlet: {on: x-, velocity: ["y*(1-y)", 0]}

@@ -33,6 +33,7 @@ time: {step: 0.1, end: 0.3}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [12, 6]}
   patches:
     inlet: {on: x-, velocity: ["y*(1-y)", 0]}

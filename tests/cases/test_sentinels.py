@@ -18,6 +18,7 @@ time: {step: 0.02, end: 0.12}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: SCHEME
   grid: {from: [-0.5, -0.5], to: [0.5, 0.5], cells: [20, 20]}
   patches:
@@ -92,6 +93,7 @@ time: {step: 0.1, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.02
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [10, 5]}
   patches:
     inlet: {on: x-, velocity: ["4*y*(1 - y)", 0]}

@@ -12,6 +12,7 @@ time: {step: 1, end: 1}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   flow: stokes
   scheme: steady
   grid: {from: [0, 0], to: [2, 1], cells: [16, 8]}

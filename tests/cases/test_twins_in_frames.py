@@ -13,6 +13,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   grid:
     from: [-0.3, -0.2]
     to: [1.7, 0.9]
@@ -50,6 +51,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [1.1, 0.9], cells: [18, 15]}
   patches:
     wall: {on: [x-, x+, y-], no_slip: true}
@@ -131,6 +133,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.02
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [24, 12]}
   patches:
     inlet: {on: x-, velocity: ["4*y*(1 - y)*ramp(t, 0, 0.5)", 0]}
@@ -158,6 +161,7 @@ time: {step: 0.1, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   grid: {from: [0, 0, 0], to: [1.4, 1, 1], cells: [7, 5, 5]}
   patches:
     inlet: {on: x-, velocity: ["y*(1 - y)*z*(1 - z)", 0, "0.01*y*(1 - y)"]}

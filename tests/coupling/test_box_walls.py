@@ -19,6 +19,7 @@ time: {step: 0.02, end: 0.8}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 0.8], cells: [10, 8]}
   patches: {top: {on: y+, outflow: true}, sides: {on: [x-, x+], slip: true}, floor: {on: y-, no_slip: true}}

@@ -37,6 +37,7 @@ time: {{step: 0.05, end: 0.15}}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {{from: [0, 0], to: [2.2, 1], cells: [22, 10]}}
   patches:
     left: {{on: x-, traction: [0, 0]}}

@@ -21,6 +21,7 @@ time: {step: 0.02, end: 0.04}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1], cells: [40, 40]}
   patches:

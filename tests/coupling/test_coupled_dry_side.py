@@ -19,6 +19,7 @@ time: {step: 1, end: 1}
 fluid:
   density: 1000
   viscosity: 1
+  element: q1q1
   scheme: steady
   flow: stokes
   gravity: [0, -10]
@@ -50,6 +51,7 @@ time: {step: 1, end: 1}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: steady
   flow: stokes
   grid: {from: [0, -0.3], to: [1, 0.3], cells: [20, 12]}
@@ -148,6 +150,7 @@ time: {step: 0.02, end: 0.06}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   grid: GRID
   patches: {outside: {on: [SIDES], no_slip: true}}
 structure:

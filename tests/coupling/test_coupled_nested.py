@@ -23,6 +23,7 @@ time: {step: 0.02, end: 0.06}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   gravity: [0, 0, -9.81]
   grid: {from: [0, 0, 0], to: [1.5, 1, 1], cells: [6, 4, 4], refine: [{around: ball, layers: 4, level: 1}]}
   patches:
@@ -57,6 +58,7 @@ time: {step: 0.02, end: 0.46}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [1, 1.5], cells: [10, 15], refine: [{around: disc, layers: 5, level: 1}]}
   patches:
     top: {on: y+, outflow: true}

@@ -11,6 +11,7 @@ time: {step: 0.1, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [-1.2, -1.2, 0], to: [1.2, 1.2, 2], cells: [5, 5, 3]}
   patches:
@@ -51,6 +52,7 @@ time: {step: 1, end: 1}
 fluid:
   density: 1000
   viscosity: 1
+  element: q1q1
   scheme: steady
   flow: stokes
   gravity: [0, 0, -10]

@@ -26,6 +26,7 @@ time: {step: 0.02, end: 0.1}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [2, 1], cells: [24, 12]}
   patches:
@@ -59,6 +60,7 @@ time: {step: 0.02, end: 0.04}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0, 0], to: [1.6, 0.8, 0.8], cells: [10, 5, 5]}
   patches:
     inlet: {on: x-, velocity: ["20*z*(0.8 - z)*y*(0.8 - y)*min(t/0.1, 1)", 0, 0]}

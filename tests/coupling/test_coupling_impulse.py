@@ -19,6 +19,7 @@ time: {{step: {step}, end: {end}}}
 fluid:
   density: 1
   viscosity: 1e-6
+  element: q1q1
   scheme: {scheme}
   grid: {{from: [-1.6, -1.6], to: [1.6, 1.6], cells: [40, 40]}}
   patches: {{box: {{on: [x-, x+, y-, y+], no_slip: true}}}}
@@ -189,6 +190,7 @@ time: {step: 0.02, end: 0.08}
 fluid:
   density: 1
   viscosity: 1e-6
+  element: q1q1
   scheme: bdf2
   grid: {from: [-1.07, 0, 0], to: [1.07, 1.07, 1.07], cells: [18, 9, 9]}
   patches: {box: {on: [x-, x+, y-, y+, z-, z+], slip: true}}
@@ -216,6 +218,7 @@ time: {{step: {step}, end: {end}}}
 fluid:
   density: 2
   viscosity: 1e-5
+  element: q1q1
   scheme: bdf2
   grid: {{from: [-1, -1, -1], to: [1, 1, 1], cells: [10, 10, 10]}}
   patches:

@@ -17,6 +17,7 @@ time: {step: 0.02, end: 0.1}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   gravity: [0, -2]
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:

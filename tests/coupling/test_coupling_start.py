@@ -20,6 +20,7 @@ time: {{step: {step}, end: {end}}}
 fluid:
   density: 1
   viscosity: 1e-4
+  element: q1q1
   grid: {{from: [-2, -2], to: [2, 2], cells: [40, 40]}}
   patches:
     walls: {{on: [x-, x+, y-], slip: true}}

@@ -18,6 +18,7 @@ time: {step: 0.001, end: 0.3}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   gravity: [0, -981]
   grid: {from: [0, 0], to: [2, 6], cells: [32, 96]}
   patches: {walls: {on: [x-, x+, y-, y+], no_slip: true}}

@@ -17,6 +17,7 @@ time: {{step: 0.1, end: 1}}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   scheme: backward_euler
   grid: {{from: [0, 0], to: [1, 1], cells: [10, 10]}}
   patches:

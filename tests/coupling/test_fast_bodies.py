@@ -15,6 +15,7 @@ time: {step: 0.1, end: 0.2}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:
@@ -84,6 +85,7 @@ time: {step: 0.5, end: 1}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   flow: stokes
   scheme: bdf2
   grid:

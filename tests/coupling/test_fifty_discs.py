@@ -19,6 +19,7 @@ time: {step: 0.005, end: 2}
 fluid:
   density: 1
   viscosity: 0.005
+  element: q1q1
   gravity: [0, -10]
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1.4], cells: [30, 42]}

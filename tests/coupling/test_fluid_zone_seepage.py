@@ -129,6 +129,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.5
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1], cells: [9, 8]}
   patches:

@@ -13,6 +13,7 @@ time: {step: 0.02, end: 0.06}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   flow: stokes
   scheme: bdf2
   grid: {from: [0, 0, 0], to: [1, 1, 1.6], cells: [8, 8, 13]}

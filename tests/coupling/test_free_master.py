@@ -16,6 +16,7 @@ time: {step: 0.05, end: 1.6}
 fluid:
   density: 1
   viscosity: 0.5
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 0.8], cells: [12, 10]}
   patches:

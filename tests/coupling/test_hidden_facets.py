@@ -16,6 +16,7 @@ time: {{step: 0.1, end: 1}}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: backward_euler
   grid: {grid}
   patches:

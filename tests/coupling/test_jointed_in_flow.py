@@ -14,6 +14,7 @@ time: {step: 0.02, end: 0.08}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   gravity: [0, -5]
   grid: {from: [0, 0], to: [1.4, 1], cells: [14, 10]}
   patches:

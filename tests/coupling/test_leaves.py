@@ -15,6 +15,7 @@ time: {step: 0.02, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [1, 1], cells: [10, 10]}
   patches:
     walls: {on: [y-, y+, x-], slip: true}

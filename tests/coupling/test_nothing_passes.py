@@ -18,6 +18,7 @@ time: {step: 0.02, end: 1.5}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1.5], cells: [16, 24]}
   patches: {top: {on: y+, outflow: true}, w: {on: [x-, x+, y-], no_slip: true}}
@@ -47,6 +48,7 @@ time: {step: 0.02, end: 1}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [-1, 0], to: [1, 1.5], cells: [24, 18]}
   patches: {walls: {on: [x-, x+, y-], no_slip: true}, top: {on: y+, traction: [0, 0]}}
   bodies:
@@ -68,6 +70,7 @@ time: {step: 0.02, end: 0.8}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1.2], cells: [14, 17]}
   patches: {top: {on: y+, outflow: true}, w: {on: [x-, x+, y-], no_slip: true}}
@@ -87,6 +90,7 @@ time: {step: 0.02, end: 0.6}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0, 0], to: [0.6, 0.6, 0.7], cells: [6, 6, 7]}
   patches: {top: {on: z+, outflow: true}, w: {on: [x-, x+, y-, y+, z-], no_slip: true}}

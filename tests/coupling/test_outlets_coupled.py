@@ -76,7 +76,7 @@ def test_on_two_processes(on_outlet, tmp_path):
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_a_free_body_beside_an_outlet(tmp_path, element, linear):
     """Its motion takes a pressure of the outlet into account, and neither solver nor element changes the pressure."""
-    text = FLOW.replace(OUTFLOW, WINDKESSEL).replace("density: 1\n", f"density: 1\n  element: {element}\n")
+    text = FLOW.replace(OUTFLOW, WINDKESSEL).replace("element: q1q1", f"element: {element}")
     text += "  bodies:\n" + FLOATING + "coupling: {}\n" + PRESSURE + "  rate: {quantity: flow_rate, through: outlet}\n"
     found = run(text, tmp_path, ("time.end", "0.08"), ("solver.linear.method", linear))
     q = found["rate"]

@@ -12,6 +12,7 @@ time: {step: 0.05, end: 0.1}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [-1.1, -1.1, 0], to: [1.1, 1.1, 2], cells: [8, 8, 7]}
   patches:

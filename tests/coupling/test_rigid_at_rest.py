@@ -14,6 +14,7 @@ time: {step: 0.02, end: 0.8}
 fluid:
   density: 1
   viscosity: 0.5
+  element: q1q1
   gravity: [0, -10]
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 0.8], cells: [12, 10]}
@@ -44,7 +45,9 @@ BALL = (
         pytest.param(DISC, "y", 1e-6, id="disc"),
         pytest.param(DISC.replace("[0.528,", "[0.556,"), "y", 1e-6, id="moved by a third of a cell"),
         pytest.param(DISC.replace("scheme: monolithic", "scheme: partitioned"), "y", 1e-6, id="partitioned"),
-        pytest.param(DISC.replace("viscosity: 0.5", "viscosity: 0.02\n  element: q2q1"), "y", 2e-3, id="q2q1"),
+        pytest.param(
+            DISC.replace("viscosity: 0.5\n  element: q1q1", "viscosity: 0.02\n  element: q2q1"), "y", 2e-3, id="q2q1"
+        ),
         pytest.param(BALL, "z", 1e-6, id="ball"),
     ],
 )

@@ -16,6 +16,7 @@ time: {step: 0.02, end: 0.5}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 0.8], cells: [12, 10]}
   patches: {top: {on: y+, outflow: true}, walls: {on: [x-, x+, y-], no_slip: true}}

@@ -17,6 +17,7 @@ time: {step: 0.02, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:
     open: {on: [x-, x+], outflow: true}

@@ -184,6 +184,7 @@ time: {step: 0.1, end: 3}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   gravity: [0, -10]
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 1.2], cells: [10, 12]}

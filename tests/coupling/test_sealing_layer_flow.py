@@ -12,6 +12,7 @@ time: {step: 0.1, end: 0.5}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:

@@ -14,6 +14,7 @@ time: {{step: 0.02, end: {end}}}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {{from: [-1, 0], to: [1, 1], cells: [36, 18]}}
   patches:
@@ -69,6 +70,7 @@ time: {step: 0.02, end: 0.3}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: backward_euler
   grid: {from: [-0.5, -0.5, 0], to: [0.5, 0.5, 0.8], cells: [10, 10, 8]}
   patches:

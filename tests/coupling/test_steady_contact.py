@@ -19,6 +19,7 @@ time: {{step: {step}, end: 1}}
 fluid:
   density: 1
   viscosity: {viscosity}
+  element: q1q1
   scheme: steady
   grid: {{from: [0, 0], to: [{to}], cells: [24, 12]}}
   patches:

@@ -22,6 +22,7 @@ structure:
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [30, 16]}
   patches:
     inlet: {on: x-, velocity: ["4*y*(1-y)", 0]}
@@ -41,6 +42,7 @@ time: {step: 1, end: 1}
 fluid:
   density: 1
   viscosity: 0.4
+  element: q1q1
   flow: stokes
   scheme: steady
   grid: {from: [0, 0], to: [1, 1], cells: [6, 7]}

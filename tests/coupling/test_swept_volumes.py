@@ -16,6 +16,7 @@ time: {{step: 0.02, end: 0.2}}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: {scheme}
   grid: {{from: [-0.5, -0.5], to: [0.5, 0.5], cells: [24, 24]}}
   patches:
@@ -47,6 +48,7 @@ time: {{step: 0.02, end: 0.3}}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   scheme: {scheme}
   grid: {{from: [-0.5, -0.5], to: [0.5, 0.5], cells: [20, 20]}}
   patches:

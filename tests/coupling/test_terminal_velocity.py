@@ -14,6 +14,7 @@ time: {{step: {step}, end: {end}}}
 fluid:
   density: 1
   viscosity: {viscosity}
+  element: q1q1
   flow: stokes
   scheme: {scheme}
   grid: {{from: [-1, -1.5], to: [1, 1.5], cells: [20, 30]}}

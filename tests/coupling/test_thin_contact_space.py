@@ -14,6 +14,7 @@ time: {step: 0.05, end: 1.4}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0, 0], to: [2, 0.3, 1], cells: [20, 3, 10]}
   patches:

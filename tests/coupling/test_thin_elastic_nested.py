@@ -53,6 +53,7 @@ time: {step: 0.02, end: 0.12}
 fluid:
   density: 1
   viscosity: 0.02
+  element: q1q1
   grid:
     from: [0, 0]
     to: [2.4, 1]

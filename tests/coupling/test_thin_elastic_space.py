@@ -13,6 +13,7 @@ time: {step: 0.05, end: 0.15}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0, 0], to: [2, 1, 1], cells: [8, 4, 4]}
   patches:
@@ -40,6 +41,7 @@ time: {step: 0.05, end: 0.1}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0, 0], to: [1.5, 1.05, 1.35], cells: [10, 7, 9]}
   patches:

@@ -16,6 +16,7 @@ time: {{step: 0.05, end: 0.65}}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: backward_euler
   grid: {{from: [0, 0], to: [2, 1], cells: [40, 20]}}
   patches:
@@ -51,6 +52,7 @@ time: {{step: 1, end: 1}}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: steady
   grid: {{from: {low}, to: {high}, cells: {grid}}}
   patches:
@@ -146,6 +148,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.01
+  element: q1q1
   scheme: backward_euler
   grid: {from: [0, 0, 0], to: [1.2, 0.6, 0.6], cells: [10, 5, 5]}
   patches:

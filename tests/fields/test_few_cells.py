@@ -79,6 +79,7 @@ time: {step: 0.01, end: 0.02}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   scheme: backward_euler
   grid: {from: [-1, 0], to: [1, 2], cells: [3, 3]}
   patches:

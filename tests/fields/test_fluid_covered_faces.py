@@ -142,6 +142,7 @@ time: {step: 0.1, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.3
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [14, 8]}
   patches:
     walls: {on: [y-, y+], no_slip: true}

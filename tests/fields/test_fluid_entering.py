@@ -71,6 +71,7 @@ time: {{step: 0.05, end: 0.4}}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: backward_euler
   grid: {{from: [0, 0], to: [3, 1], cells: [30, 10]}}
   patches:

@@ -368,6 +368,7 @@ time: {step: 1, end: 1}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: steady
   grid: {from: [0, 0], to: [1, 1], cells: [4, 4]}
   patches:

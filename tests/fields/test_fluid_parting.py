@@ -59,6 +59,7 @@ time: {{step: 0.02, end: 0.1}}
 fluid:
   density: 1
   viscosity: 0.02
+  element: q1q1
   scheme: backward_euler
   grid: {{from: [0, 0], to: [2, 1], cells: {cells}}}
   patches:

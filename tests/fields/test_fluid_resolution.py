@@ -332,6 +332,7 @@ FILM = {
     "fluid": {
         "density": 1,
         "viscosity": 1,
+        "element": "q1q1",
         "flow": "stokes",
         "scheme": "steady",
         "grid": {

@@ -28,6 +28,7 @@ time: {step: 0.02, end: 0.12}
 fluid:
   density: 2
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [30, 15]}
   patches:
     walls: {on: [x-, x+, y-, y+], no_slip: true}
@@ -61,6 +62,7 @@ time: {step: 0.05, end: 0.1}
 fluid:
   density: 2
   viscosity: 0.5
+  element: q1q1
   flow: stokes
   grid: {from: [0, 0], to: [1, 2], cells: [5, 8]}
   patches:

@@ -329,6 +329,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1
   viscosity: 0.1
+  element: q1q1
   scheme: SCHEME
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:

@@ -14,6 +14,7 @@ time: {step: 0.05, end: 0.2}
 fluid:
   density: 1000
   viscosity: 1
+  element: q1q1
   gravity: [3, -9]
   grid: {from: [0, 0], to: [1, 1], cells: [10, 10]}
   patches: {walls: {on: [x-, x+, y-, y+], no_slip: true}}

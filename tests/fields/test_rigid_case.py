@@ -15,6 +15,7 @@ time: {step: 0.02, end: 0.08}
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [1, 1], cells: [12, 12]}
   patches:
     walls: {on: [x-, x+, y-, y+], no_slip: true}

@@ -80,6 +80,7 @@ time: {step: 0.02, end: 0.2}
 fluid:
   density: 1.0e-5
   viscosity: 1.0e-8
+  element: q1q1
   gravity: [2, -10]
   scheme: backward_euler
   grid: {from: [0, 0], to: [1, 0.4], cells: [15, 6]}

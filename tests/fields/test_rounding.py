@@ -70,6 +70,7 @@ time: {{step: 0.01, end: 0.4, retry: {{halvings: 0}}}}
 fluid:
   density: {density}
   viscosity: {viscosity}
+  element: q1q1
   scheme: backward_euler
   grid: {{from: [0, 0], to: [{end}, {height}], cells: [13, 2]}}
   patches:

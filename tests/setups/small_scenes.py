@@ -32,6 +32,7 @@ CHANNEL = """\
 fluid:
   density: 1
   viscosity: 0.05
+  element: q1q1
   grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
   patches:
     inlet: {on: x-, velocity: ["4*y*(1 - y)*min(t/0.1, 1)", 0]}

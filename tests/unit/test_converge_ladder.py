@@ -21,6 +21,7 @@ time: {step: 0.1, end: 1}
 fluid:
   density: 1
   viscosity: 1
+  element: q1q1
   grid:
     from: [0, -1]
     to: [4, 1]

@@ -276,9 +276,9 @@ def test_the_case_without_mistakes_loads():
     assert case.warnings == ()
     assert case.dimension == 2
     assert {probe.field for probe in case.probes.values()} == {"fluid"}
-    assert case.fluid.dofs == 3 * 41 * 11
+    assert case.fluid.dofs(2) == 2 * 81 * 21 + 41 * 11
     text = summary(case)
-    for words in ("Navier-Stokes, bdf2, q1q1", "40 x 10 cells", "inlet (velocity)", "disc, rigid, moved", "1,353"):
+    for words in ("Navier-Stokes, bdf2, q2q1", "40 x 10 cells", "inlet (velocity)", "disc, rigid, moved", "3,853"):
         assert words in text
 
 

@@ -116,7 +116,7 @@ def test_refined_grids():
     grid = read_grid(load(refined))
     assert set(grid.width) == {1, 2, 4}
     assert f"40 x 10 cells, in parts halved 2 times: {len(grid.first):,} in all" in text
-    assert f"{3 * grid.unknowns(1):,} with" in text
+    assert f"{2 * grid.unknowns(2) + grid.unknowns(1):,} with" in text
     coarse = refined.replace("level: 2", "layers: 2")
     message = "body 'cylinder' comes within 3 cells of cells that are not of the finest level, 1: refine around it, "
     message += "or in a box over all of its way"
