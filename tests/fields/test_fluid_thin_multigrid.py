@@ -148,7 +148,7 @@ def test_plate_that_is_pushed_through_a_duct_with_multigrid(element):
     [(2, "q1q1", 8), pytest.param(3, "q1q1", 8, marks=SLOW), pytest.param(2, "q2q1", 8, marks=SLOW)],
 )
 def test_multigrid_around_thin_plates_on_processes(processes, element, count):
-    """The same forces as on one, in equal and nested cells."""
+    """The same forces as on one, in equal and nested cells; no unknown belongs to no node."""
     on_processes(processes, __file__, element, count)
 
 
@@ -162,6 +162,8 @@ def main(element, count):
             forces.append((fluid.force()["plate"].sum(axis=0), iterations))
             assert fluid.iterate.solver.sequence.current == "multigrid"
             assert fluid.grid.sheets is not None
+            unknowns = fluid.unknowns
+            assert unknowns.owned == unknowns.velocity.owned * unknowns.dim + unknowns.pressure.owned
         (force, many), (alone, few) = forces
         assert np.abs(force - alone).max() < 1e-7 * np.abs(alone).max(), (force, alone)
         assert many <= few + 6, (many, few)
