@@ -13,6 +13,7 @@ from thin_space import duct, plate, turn
 
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
 from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -89,6 +90,16 @@ def test_no_coarse_node_has_both_sides(element, count, cells):
         has = np.isfinite(least)
         assert np.abs(most[has] - least[has]).max() < 1e-7
         assert {round(p, 6) for p in most[has]} == {0.7, 2.0}
+
+
+def test_levels_of_nested_cells_look_at_nodes_of_the_mesh_alone(monkeypatch):
+    """Not at those of the finest lattice, of which many do not exist, and at these once for all components."""
+    asked, found = [], LevelGrid.interpolation
+    monkeypatch.setattr(LevelGrid, "interpolation", lambda self, x: asked.append(len(x)) or found(self, x))
+    fluid = channel_with_plate(nested_cells(12), 1 / 12, 0.2, OPEN)
+    levels = fluid.iterate.solver.create_multigrid().levels
+    assert max(asked) == fluid.unknowns.pressure.owned < np.prod(levels[0].components[0].lattice.shape)
+    assert len(asked) == 2 * (len(levels) - 1)  # for copies, and for values
 
 
 @pytest.mark.parametrize("cells", [equal_cells, nested_cells])
