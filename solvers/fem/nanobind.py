@@ -126,9 +126,9 @@ def cell_blocks(space: Any) -> Indices32:
     return np.asarray(space.dofmap.list)
 
 
-def replace_dofs(space: Any, cells: Indices32, ghosts: NDArray[np.int64], owners: Indices32) -> Any:
-    """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
-    dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
+def replace_dofs(space: Any, cells: Indices32, own: int, ghosts: NDArray[np.int64], owners: Indices32) -> Any:
+    """The space with other dof blocks in its cells: `own` of this process, and ghosts with their owners."""
+    dofmap = space.dofmap
     try:
         index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners)
     except TypeError:  # later with a tag for messages

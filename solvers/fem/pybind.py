@@ -109,9 +109,9 @@ def cell_blocks(space: Any) -> Indices32:
     return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
-def replace_dofs(space: Any, cells: Indices32, ghosts: NDArray[np.int64], owners: Indices32) -> Any:
-    """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
-    dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
+def replace_dofs(space: Any, cells: Indices32, own: int, ghosts: NDArray[np.int64], owners: Indices32) -> Any:
+    """The space with other dof blocks in its cells: `own` of this process, and ghosts with their owners."""
+    dofmap = space.dofmap
     index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners)
     links = cpp.graph.AdjacencyList_int32(cells)
     replaced = cpp.fem.DofMap(dofmap.dof_layout, index_map, dofmap.index_map_bs, links, dofmap.bs)

@@ -76,27 +76,31 @@ def cell_blocks(space: Any) -> NDArray[np.int32]:
 def identify_blocks(
     space: Any, blocks: NDArray[np.int32], masters: NDArray[np.int64], owners: NDArray[np.int32]
 ) -> tuple[Any, NDArray[np.int32]]:
-    """A space whose cells have other dof blocks in the place of some: (space, their local numbers) (collective).
+    """A space with other dof blocks in the place of some: (space, its number of each local block) (collective).
 
     `blocks` are local; `masters` are the global numbers of what replaces them, and `owners` the processes that own
-    these. All other numbers stay; the replaced blocks remain, and no cell has them.
+    these; the master of a master is itself. Replaced blocks are no unknowns of the new space: those after them move up.
     """
     dofmap = space.dofmap
     index_map = dofmap.index_map
     first, last = index_map.local_range
-    ghosts = np.asarray(index_map.ghosts, dtype=np.int64)
-    new = np.setdiff1d(masters[(masters < first) | (masters >= last)], ghosts)
-    all_ghosts = np.concatenate([ghosts, new])
-    order = np.argsort(all_ghosts, kind="stable")
-    owned = (masters >= first) & (masters < last)
-    local = np.where(owned, masters - first, 0)
-    local[~owned] = (last - first) + order[np.searchsorted(all_ghosts[order], masters[~owned])]
-    owner_of = dict(zip(masters.tolist(), owners.tolist(), strict=True))
-    all_owners = [*np.asarray(index_map.owners).tolist(), *(owner_of[ghost] for ghost in new.tolist())]
-    place = np.arange(int(index_map.size_local + index_map.num_ghosts), dtype=np.int32)
-    place[blocks] = local
-    with_ghosts = calls.replace_dofs(space, place[cell_blocks(space)], all_ghosts, np.array(all_owners, dtype=np.int32))
-    return with_ghosts, local.astype(np.int32)
+    number = np.concatenate([np.arange(first, last), np.asarray(index_map.ghosts, dtype=np.int64)])
+    own, before = last - first, number.copy()
+    number[blocks] = masters
+    replaced = np.flatnonzero(number[:own] != before[:own])
+    gone = np.concatenate(space.mesh.comm.allgather(first + replaced))  # in ascending order, as processes are
+    owner = np.concatenate([np.full(own, -1, dtype=np.int32), np.asarray(index_map.owners, dtype=np.int32)])
+    owner[blocks] = owners
+    elsewhere = (number < first) | (number >= last)
+    ghosts, example, of_ghosts = np.unique(number[elsewhere], return_index=True, return_inverse=True)
+    kept = own - len(replaced)
+    place = np.empty(len(number), dtype=np.int32)
+    place[~elsewhere] = number[~elsewhere] - first - np.searchsorted(first + replaced, number[~elsewhere])
+    place[elsewhere] = kept + of_ghosts
+    found = calls.replace_dofs(
+        space, place[cell_blocks(space)], kept, ghosts - np.searchsorted(gone, ghosts), owner[elsewhere][example]
+    )
+    return found, place
 
 
 def component_dofs(

@@ -13,6 +13,7 @@ from thin_space import duct, plate, turn
 
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
 from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -91,6 +92,16 @@ def test_no_coarse_node_has_both_sides(element, count, cells):
         assert {round(p, 6) for p in most[has]} == {0.7, 2.0}
 
 
+def test_levels_of_nested_cells_look_at_nodes_of_the_mesh_alone(monkeypatch):
+    """Not at those of the finest lattice, of which many do not exist, and at these once for all components."""
+    asked, found = [], LevelGrid.interpolation
+    monkeypatch.setattr(LevelGrid, "interpolation", lambda self, x: asked.append(len(x)) or found(self, x))
+    fluid = channel_with_plate(nested_cells(12), 1 / 12, 0.2, OPEN)
+    levels = fluid.iterate.solver.create_multigrid().levels
+    assert max(asked) == fluid.unknowns.pressure.owned < np.prod(levels[0].components[0].lattice.shape)
+    assert len(asked) == 2 * (len(levels) - 1)  # for copies, and for values
+
+
 @pytest.mark.parametrize("cells", [equal_cells, nested_cells])
 @pytest.mark.parametrize("end", [SEALS, OPEN])
 @pytest.mark.parametrize(
@@ -148,7 +159,7 @@ def test_plate_that_is_pushed_through_a_duct_with_multigrid(element):
     [(2, "q1q1", 8), pytest.param(3, "q1q1", 8, marks=SLOW), pytest.param(2, "q2q1", 8, marks=SLOW)],
 )
 def test_multigrid_around_thin_plates_on_processes(processes, element, count):
-    """The same forces as on one, in equal and nested cells."""
+    """The same forces as on one, in equal and nested cells; no unknown belongs to no node."""
     on_processes(processes, __file__, element, count)
 
 
@@ -162,6 +173,8 @@ def main(element, count):
             forces.append((fluid.force()["plate"].sum(axis=0), iterations))
             assert fluid.iterate.solver.sequence.current == "multigrid"
             assert fluid.grid.sheets is not None
+            unknowns = fluid.unknowns
+            assert unknowns.owned == unknowns.velocity.owned * unknowns.dim + unknowns.pressure.owned
         (force, many), (alone, few) = forces
         assert np.abs(force - alone).max() < 1e-7 * np.abs(alone).max(), (force, alone)
         assert many <= few + 6, (many, few)

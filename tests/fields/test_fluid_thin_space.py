@@ -8,6 +8,7 @@ from thin_space import duct, sealing, turn
 
 from fsci.running.history import read_history
 from solvers.fluid.flow.probes import at_point
+from solvers.fluid.geometry.thin import thinness
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.terms.boundary.patches import Patch
@@ -186,6 +187,26 @@ probes:
   front: {{quantity: pressure, at: [0.61, 0.3, 0.3]}}
   back: {{quantity: pressure, at: [0.64, 0.3, 0.3]}}
 """
+
+
+@pytest.mark.parametrize("at_once", [7, 256, 10**6])
+@pytest.mark.parametrize(("thickness", "thin"), [(0.1, True), (2.4, True), (4.5, False)])
+def test_points_that_tell_whether_a_plate_is_thin(monkeypatch, thickness, thin, at_once):
+    """Some of a thin plate, all of a thick one, few at a time: no more than their pairs are in memory."""
+    looked_at, parts, found = [], [], thinness._opposed
+
+    def counted(points, normal):
+        parts.append(-(-len(points) // at_once))
+        for pairs in found(points, normal):
+            looked_at.append(len(np.unique(pairs[0])))
+            yield pairs
+
+    monkeypatch.setattr(thinness, "_opposed", counted)
+    monkeypatch.setattr(thinness, "POINTS_AT_ONCE", at_once)
+    points, facets = block([0.3, 0.3, 1.0], [7.7, 7.7, 1.0 + thickness])
+    assert thinness.may_be_thin(uniform([0, 0, 0], [8, 8, 8], [16, 16, 16]), facets, points, 5.0) == thin
+    assert max(looked_at) <= at_once
+    assert len(looked_at) <= 1 + parts[0] / 2 if thin else len(looked_at) == parts[0]
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """Periodic directions: cells at the end of the box have the unknowns of the nodes at its beginning.
 
-Hence assembly does not need to treat periods. The unknowns of the nodes at the end belong to no cell. They remain as
-inactive unknowns, like those inside of bodies.
+Hence assembly does not need to treat periods. The nodes at the end have no unknowns of their own.
 """
 
 from __future__ import annotations
@@ -46,7 +45,5 @@ def join_ends(comm: MPI.Comm, space: Any, parts: list[LatticeNodes]) -> tuple[An
     start_keys, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
     order = np.argsort(start_keys)
     twin = order[np.searchsorted(start_keys[order], keys[at_end])]
-    space, local = fem.identify_blocks(space, blocks[at_end], masters[twin], owners[twin])
-    joined = np.arange(blocks.max(initial=-1) + 1, dtype=np.int32)
-    joined[blocks[at_end]] = local
+    space, joined = fem.identify_blocks(space, blocks[at_end], masters[twin], owners[twin])
     return space, [replace(part, dofs=size * joined[part.dofs // size] + part.dofs % size) for part in parts]

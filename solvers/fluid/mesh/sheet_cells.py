@@ -143,9 +143,7 @@ def join_nodes(
     numbers, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
     numbers, first = np.unique(numbers, return_index=True)
     twin = first[np.searchsorted(numbers, number[shared])]
-    space, local = fem.identify_blocks(space, shared.astype(np.int32), masters[twin], owners[twin])
-    joined = np.arange(len(number), dtype=np.int32)
-    joined[shared] = local
+    space, joined = fem.identify_blocks(space, shared.astype(np.int32), masters[twin], owners[twin])
 
     def renumbered(part: LatticeNodes) -> LatticeNodes:
         blocks = part.dofs // size

@@ -144,10 +144,7 @@ class Unknowns:
         return int(self.index_map.size_global) * self.block_size
 
     def counted(self) -> int:
-        """Dofs of nodes on all processes, without hanging ones (collective).
-
-        Joined nodes leave further dofs that belong to no cell.
-        """
+        """Dofs of nodes on all processes, without hanging ones (collective)."""
         dofs = np.concatenate([nodes.dofs[: nodes.owned].ravel() for nodes in (self.velocity, self.pressure)])
         free = len(dofs) if self.hanging is None else int(np.count_nonzero(~self.hanging.dofs[dofs]))
         return int(self.grid.comm.allreduce(free))

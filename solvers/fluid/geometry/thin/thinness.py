@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -11,6 +13,8 @@ from solvers.mesh.tessellation import unit_normals
 
 #: Product of unit normals below which two surfaces face opposite directions: corners below 45 degrees.
 OPPOSITE_NORMALS = -0.7
+#: Points whose pairs are found together, to bound the memory; the answer does not depend on it.
+POINTS_AT_ONCE = 256
 ALIKE_NORMALS = 4  #: normals of facets in one cell whose components differ by less than 1 / ALIKE_NORMALS count as one
 
 
@@ -21,29 +25,36 @@ def may_be_thin(grid: Grid, facets: Indices, x: Array, thick: float) -> bool:
     cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(grid.edges))
     if grid.dim == 2:
         points, normal = _on_segments(x[facets], cell)
-        first, second = cKDTree(points).query_pairs(thick * cell, output_type="ndarray").T
+        pairs = iter([cKDTree(points).query_pairs(thick * cell, output_type="ndarray").T])
     else:
         points, normal = _on_triangles(x[facets], cell)
-        first, second = _opposed(points / (thick * cell), normal)
-    opposed = np.einsum("pi,pi->p", normal[first], normal[second]) < OPPOSITE_NORMALS
-    way = points[second] - points[first]
-    behind = np.einsum("pi,pi->p", way, normal[first]) <= 0.0
+        pairs = _opposed(points / (thick * cell), normal)
     sizes = np.stack([cell_sizes_at(edge, points[:, axis]) for axis, edge in enumerate(grid.edges)], axis=1)
     size = 1.0 / np.linalg.norm(normal / sizes, axis=1)
-    close = np.linalg.norm(way, axis=1) <= thick * np.maximum(size[first], size[second])
-    return bool((opposed & behind & close).any())
+    for first, second in pairs:
+        opposed = np.einsum("pi,pi->p", normal[first], normal[second]) < OPPOSITE_NORMALS
+        way = points[second] - points[first]
+        behind = np.einsum("pi,pi->p", way, normal[first]) <= 0.0
+        close = np.linalg.norm(way, axis=1) <= thick * np.maximum(size[first], size[second])
+        if (opposed & behind & close).any():
+            return True
+    return False
 
 
-def _opposed(points: Array, normal: Array) -> tuple[Indices, Indices]:
-    """Pairs (of indices, each twice) of points up to 1 apart with opposed normals, and some more.
+def _opposed(points: Array, normal: Array) -> Iterator[Array]:
+    """Pairs (of indices, each twice) of points up to 1 apart with opposed normals, and some more, shape (2, pairs).
 
     Opposed normals n, m have |n + m|^2 = 2 + 2 n m below a bound, so that both are close to each other in a space of
-    points and normals. There are few such pairs if nothing is thin.
+    points and normals. There are few such pairs if nothing is thin, and hundreds for each point if something is: then
+    those of the first points answer the question.
     """
     bound = 2.0 + 2.0 * OPPOSITE_NORMALS
-    one, other = (cKDTree(np.concatenate([points * np.sqrt(bound), way], axis=1)) for way in (normal, -normal))
-    found = one.sparse_distance_matrix(other, np.sqrt(2.0 * bound), output_type="ndarray")
-    return found["i"], found["j"]
+    at, numbers = points * np.sqrt(bound), np.arange(len(points))
+    other = cKDTree(np.concatenate([at, -normal], axis=1))
+    for some in np.array_split(numbers, -(-len(points) // POINTS_AT_ONCE)):
+        one = cKDTree(np.concatenate([at[some], normal[some]], axis=1))
+        found = one.sparse_distance_matrix(other, np.sqrt(2.0 * bound), output_type="ndarray")
+        yield np.stack([some[found["i"]], found["j"]])
 
 
 def cell_sizes_at(edge: Array, x: Array) -> Array:

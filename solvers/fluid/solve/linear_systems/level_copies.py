@@ -10,6 +10,7 @@ Source: the rule for nodes of Schott, Wall, Comput. Methods Appl. Mech. Engrg. 2
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -40,20 +41,26 @@ class LevelCopies:
     keys: Indices
     numbers: Indices
 
-    @property
-    def places(self) -> Indices:
-        """Number in the lattice of each node."""
-        return np.concatenate([np.arange(self.size), self.further])
+    def places(self, numbers: Indices) -> Indices:
+        """Number in the lattice of each of some nodes."""
+        found = numbers.copy()
+        further = numbers >= self.size
+        found[further] = self.further[numbers[further] - self.size]
+        return found
 
     def parents(self, finer: Indices, places: Indices, weights: Array) -> Entries:
         """Entries to nodes of this level, from those to places in its lattice; constant values stay exact."""
-        keys = finer * self.size + places
+        rows = np.unique(self.keys // self.size)  # all other nodes are interpolated from those of the lattice
+        row = np.searchsorted(rows, finer)
+        at_rows = np.flatnonzero(np.append(rows, -1)[row] == finer)
+        keys = finer[at_rows] * self.size + places[at_rows]
         at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        found = np.where(self.keys[at] == keys, self.numbers[at], places) if len(self.keys) else places
-        some = found >= 0
-        finer, parents, weights = finer[some], found[some], weights[some]
-        rows, row = np.unique(finer, return_inverse=True)
-        return finer, parents, weights / np.bincount(row, weights, len(rows))[row]
+        parents, weights = places.copy(), weights.copy()
+        parents[at_rows] = np.where(self.keys[at] == keys, self.numbers[at], places[at_rows])
+        some = parents >= 0
+        at_rows = at_rows[some[at_rows]]
+        weights[at_rows] /= np.bincount(row[at_rows], weights[at_rows], len(rows))[row[at_rows]]
+        return finer[some], parents[some], weights[some]
 
     @property
     def lowest(self) -> Indices:
@@ -102,25 +109,26 @@ def from_second_degree(sheets: Sheets, corners: LevelCopies) -> LevelCopies:
     node, corner = np.nonzero((np.abs(inner[:, None] - 2 * steps) < 2).all(axis=2))  # with a positive weight
     finer, number = sheets.nodes(cells, 2, inner)[:, node].ravel(), sheets.nodes(cells, 1, steps)[:, corner].ravel()
     some = number >= corners.size
-    keys, at = np.unique(finer[some] * corners.size + corners.places[number[some]], return_index=True)
+    keys, at = np.unique(finer[some] * corners.size + corners.places(number[some]), return_index=True)
     return replace(corners, keys=keys, numbers=number[some][at])
 
 
-def coarser_copies(fine: LevelCopies, entries: Entries, size: int) -> LevelCopies:
-    """Copies on the next coarser level.
+def coarser_copies(fine: LevelCopies, interpolation: Callable[[Indices], Entries], size: int) -> LevelCopies:
+    """Copies on the next coarser level; nodes without fluid, as most of nested cells' lattice, are not looked at.
 
-    entries: of the interpolation from its lattice, which has `size` nodes, to that of the finer level.
+    interpolation: entries from nodes of its lattice, which has `size`, to places in that of the finer level.
     """
-    finer, places, weights = entries
-    count = fine.size + len(fine.further)
-    supports = sparse.csr_matrix((weights, (finer, places)), shape=(fine.size, size))[fine.places]
-    concerned = supports.T @ fine.parted > 0.0
+    nodes, column = np.unique(fine.cells.indices, return_inverse=True)
+    nodes = nodes.astype(np.int64)
+    cells = sparse.csr_matrix((fine.cells.data, column, fine.cells.indptr), shape=(fine.cells.shape[0], len(nodes)))
+    finer, places, weights = interpolation(fine.places(nodes))
+    supports = sparse.csr_matrix((weights, (finer, places)), shape=(len(nodes), size))
+    concerned = np.zeros(size, dtype=bool)
+    concerned[supports[fine.parted[nodes]].indices] = True
     kept = supports.tocoo()
-    has_fluid = np.zeros(count, dtype=bool)
-    has_fluid[fine.cells.indices] = True
-    some = concerned[kept.col] & has_fluid[kept.row]
+    some = concerned[kept.col]
     node, place, weight = kept.row[some].astype(np.int64), kept.col[some].astype(np.int64), kept.data[some]
-    side = _sides(fine.cells, node, place, count, size)
+    side = _sides(cells, node, place, size)
     # of the sides in a place, that with the most fluid keeps the node of the lattice, first those with a node there
     sides, where = np.unique(side, return_index=True)
     of_side = place[where]
@@ -133,19 +141,22 @@ def coarser_copies(fine: LevelCopies, entries: Entries, size: int) -> LevelCopie
     number[order[first]], number[order[copied]] = of_side[order][first], size + np.arange(np.count_nonzero(copied))
     further = of_side[order][copied]
     own = number[side] != place
-    order = np.argsort(keys := node[own] * size + place[own])
+    order = np.argsort(keys := nodes[node[own]] * size + place[own])
     found = LevelCopies(
         size, further, sparse.csr_matrix((0, 0)), np.concatenate([concerned, np.ones(len(further), dtype=bool)]),
         keys[order], number[side][own][order],
     )  # fmt: skip
-    finer, parents, weights = found.parents(kept.row.astype(np.int64), kept.col.astype(np.int64), kept.data)
-    to_parents = sparse.csr_matrix((weights, (finer, parents)), shape=(count, size + len(further)))
-    return replace(found, cells=_different(fine.cells @ to_parents))
+    finer, parents, weights = found.parents(nodes[kept.row], kept.col.astype(np.int64), kept.data)
+    entries = (weights, (np.searchsorted(nodes, finer), parents))
+    return replace(found, cells=_different(cells @ sparse.csr_matrix(entries, shape=(len(nodes), size + len(further)))))
 
 
-def _sides(cells: sparse.csr_matrix, node: Indices, place: Indices, count: int, size: int) -> Indices:
-    """Numbers from 0 of the sides of pairs of a finer node and a place that has it in its support."""
-    start = np.searchsorted(node, np.arange(count + 1))  # pairs are sorted by nodes
+def _sides(cells: sparse.csr_matrix, node: Indices, place: Indices, size: int) -> Indices:
+    """Numbers from 0 of the sides of pairs of a finer node and a place that has it in its support, sorted by nodes.
+
+    cells: 1 where a node belongs to a cell.
+    """
+    start = np.searchsorted(node, np.arange(cells.shape[1] + 1))
     inside = cells.tocoo()
     row, at = ragged(np.diff(start)[inside.col])
     pair = start[inside.col][row] + at

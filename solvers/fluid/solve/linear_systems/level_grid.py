@@ -17,7 +17,7 @@ from scipy import sparse
 from solvers.api import Array, Indices
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.grid.nested import Nested
-from solvers.fluid.solve.linear_systems.level_copies import LevelCopies, coarser_copies
+from solvers.fluid.solve.linear_systems.level_copies import Entries, LevelCopies, coarser_copies
 
 #: A level has at most this share of the nodes of the next finer one.
 THINNER = 0.6
@@ -52,7 +52,7 @@ class LevelGrid:
 
     def indices(self, numbers: Indices) -> Indices:
         """Indices of the planes of nodes, given their numbers, shape (nodes, dim)."""
-        places = numbers if self.copies is None else self.copies.places[numbers]
+        places = numbers if self.copies is None else self.copies.places(numbers)
         return np.stack(np.unravel_index(places, self.shape, order="F"), axis=1)
 
     def points(self, nodes: Indices) -> Array:
@@ -75,8 +75,11 @@ class LevelGrid:
         found = self._coarser()
         if self.copies is None:
             return found
-        entries = found.interpolation(self.points(self.indices(np.arange(self.size))))
-        return replace(found, copies=coarser_copies(self.copies, entries, found.size))
+
+        def interpolation(places: Indices) -> Entries:
+            return found.interpolation(self.points(self.indices(places)))
+
+        return replace(found, copies=coarser_copies(self.copies, interpolation, found.size))
 
     def _coarser(self) -> LevelGrid:
         if self.nested is not None:

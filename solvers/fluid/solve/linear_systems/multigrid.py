@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from solvers.algebra.linear import BLOCKS, incomplete_factors
-from solvers.api import Indices
+from solvers.api import Array, Indices
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.solve.linear_systems.coarse_matrix import CoarseMatrix
 from solvers.fluid.solve.linear_systems.decoupled import decoupled
@@ -126,21 +126,34 @@ def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level
 def interpolation(comm: MPI.Comm, fine: Level, coarse: Level) -> PETSc.Mat:
     """P: values on the finer level from those on the coarser one (collective)."""
     rows, columns, data = [], [], []
+    before: tuple[Component, LevelGrid] | None = None
     for here, there in zip(fine.components, coarse.components, strict=True):
         unknown = _everywhere(comm, there)
-        nodes, parents, weights = there.lattice.interpolation(here.lattice.points(here.nodes))
-        dofs = here.dofs[nodes]
-        if there.lattice.copies is not None:
-            finer, parents, weights = there.lattice.copies.parents(here.numbers[nodes], parents, weights)
-            order = np.argsort(here.numbers)
-            dofs = here.dofs[order[np.searchsorted(here.numbers, finer, sorter=order)]]
-        rows.append(dofs - fine.start)
+        if before is None or there.lattice is not before[1] or not _same_nodes(here, before[0]):
+            nodes, parents, weights = _parents(here, there.lattice)
+        before = here, there.lattice
+        rows.append(here.dofs[nodes] - fine.start)
         columns.append(unknown[parents])
         data.append(weights)
     entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
     local = sparse.csr_matrix(entries, shape=(fine.owned, comm.allreduce(coarse.owned)))
     csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
     return PETSc.Mat().createAIJ(((fine.owned, None), (coarse.owned, None)), csr=csr, comm=comm)
+
+
+def _same_nodes(one: Component, other: Component) -> bool:
+    """Whether two components of a level have the same nodes: interpolations to them are the same."""
+    return one.lattice.shape == other.lattice.shape and np.array_equal(one.numbers, other.numbers)
+
+
+def _parents(here: Component, coarser: LevelGrid) -> tuple[Indices, Indices, Array]:
+    """Entries of the interpolation: (index of each node of a component, number on the coarser level, weight)."""
+    nodes, parents, weights = coarser.interpolation(here.lattice.points(here.nodes))
+    if coarser.copies is None:
+        return nodes, parents, weights
+    finer, parents, weights = coarser.copies.parents(here.numbers[nodes], parents, weights)
+    order = np.argsort(here.numbers)
+    return order[np.searchsorted(here.numbers, finer, sorter=order)], parents, weights
 
 
 def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
