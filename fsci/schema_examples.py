@@ -116,7 +116,7 @@ EXAMPLES = {
     "Obstacle": 'obstacles:\n  stamp: {mesh: {file: stamp.geo}, on: face, motion: [0, 0, "-0.1*t"]}',
     "Probe": "probes:\n  tip: {quantity: displacement, at: [1, 0.05]}\n  clamp: {quantity: reaction, on: left}\n"
     "  drag: {quantity: drag_coefficient, body: cylinder, reference: {velocity: 0.2, length: 0.1}}\n"
-    "  gap: {quantity: gap, pair: floor}",
+    "  gap: {quantity: gap, pair: floor}\n  wake: {quantity: velocity, box: [[0.5, 0], [1, 0.2]]}",
     "Plane": "plane: {point: [0.5, 0], normal: [1, 0]}",
     "Reference": "reference: {velocity: 0.2, length: 0.1}",
     "Output": "output: {fields_every: 5, checkpoint_every: 20}",

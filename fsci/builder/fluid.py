@@ -21,6 +21,7 @@ from fsci.case.rigid_motion import finite, rigid_motion
 from fsci.meshes.nested import following, read_grid
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid.flow import probes
+from solvers.fluid.flow.box_probes import CrossesThinBody, box_probe
 from solvers.fluid.flow.extreme_pressure import extreme_pressure
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.section import plane_probe
@@ -165,6 +166,15 @@ def _through_plane(case: Case, forces: probes.Forces, name: str) -> probes.Probe
     return plane_probe(forces.fluid, settings.quantity, settings.plane.point, settings.plane.normal)
 
 
+def _in_box(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    assert settings.box is not None
+    try:
+        return box_probe(forces.fluid, settings.quantity, *settings.box)
+    except CrossesThinBody as error:
+        raise case.error(("probes", name, "box"), str(error)) from None
+
+
 def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return probes.of_outlet(forces.fluid, case.probes[name].through or "")
 
@@ -195,6 +205,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", "on"): _on_patch,
     ("flow_rate", "through"): _on_patch,
     **{(quantity, "plane"): _through_plane for quantity in ("flow_rate", "area", "pressure")},
+    **{(quantity, "box"): _in_box for quantity in ("velocity", "pressure", "volume", "kinetic_energy")},
     ("outlet_pressure", "through"): _of_outlet,
     ("pressure", ""): _extreme,
     ("force", ""): _force,

@@ -115,6 +115,8 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
         yield from _reference(probe.reference, grid.dimension, (*keys, "reference"))
     if probe.plane is not None:
         yield from _plane(probe.plane, grid, (*keys, "plane"))
+    if probe.box is not None:
+        yield from _box(probe.box, grid, (*keys, "box"))
     yield from length_mistakes(probe.about, grid.dimension, (*keys, "about"))
     yield from length_mistakes(probe.minus, grid.dimension, (*keys, "minus"))
     for key in ("at", "minus"):
@@ -140,6 +142,19 @@ def _plane(plane: PlaneSection, grid: GridSection, keys: Keys) -> Iterator[Mista
     sides = [sum(n * (x - p) for n, x, p in zip(plane.normal, at, plane.point, strict=True)) for at in corners]
     if not min(sides) < 0.0 < max(sides):
         yield keys, "the plane does not pass through the inside of the fluid's box; on its faces are patches: 'through'"
+
+
+def _box(corners: tuple[tuple[float, ...], ...], grid: GridSection, keys: Keys) -> Iterator[Mistake]:
+    for end, corner in enumerate(corners):
+        if len(corner) != grid.dimension:
+            yield (*keys, end), f"a corner must have {grid.dimension} entries in {grid.dimension}D, not {len(corner)}"
+            return
+    for axis, low, high in zip("xyz", *corners, strict=False):
+        if not low < high:
+            yield keys, f"give the lowest corner first: along {axis} {low:g} is not below {high:g}"
+            return
+    if not all(a < high and b > low for a, b, low, high in zip(*corners, grid.start, grid.to, strict=True)):
+        yield keys, "this box is outside of that of the fluid"
 
 
 def _reference(reference: Reference, dimension: int, keys: Keys) -> Iterator[Mistake]:

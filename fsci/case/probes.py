@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from pydantic import model_validator
 
 from fsci.case.quantities import FIELDS, LOCATIONS, QUANTITIES, Field, Quantity, described
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, NumberVector, Positive, Text
+from fsci.case.values import EntryCount, Name, NumberVector, Positive, Text
 
 #: Quantities of a pair that have no place.
 OF_WHOLE_PAIRS = ("contact_area", "stick_area", "mean_pressure", "first_contact", "overlap")
@@ -76,6 +76,9 @@ column NAME. In 2D everything is per unit of depth.
     )
     through: Text | None = setting(None, "name of a patch of the fluid")
     plane: PlaneSection | None = setting(None, "plane through the fluid")
+    box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
+        None, "lowest and highest corner of a box in the fluid", unit="m"
+    )
     pair: Name | None = setting(None, "name of a contact pair")
     extreme: Literal["largest", "least"] | None = setting(
         None, "of all slave nodes of the pair, or of all fluid; default: the least gap, the largest pressure"
@@ -85,7 +88,7 @@ column NAME. In 2D everything is per unit of depth.
 
     @property
     def place(self) -> str:
-        """The setting of the location: pair, at, on, through, plane or none."""
+        """The setting of the location: pair, at, on, through, plane, box or none."""
         return next((name for name in LOCATIONS if getattr(self, name) is not None), "")
 
     @property

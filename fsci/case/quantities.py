@@ -16,6 +16,7 @@ LOCATIONS = {
     "on": "'on: SURFACE'",
     "through": "'through: PATCH'",
     "plane": "'plane: {point: [..], normal: [..]}'",
+    "box": "'box: [[..], [..]]'",
 }
 WHOLE = ""  #: none of them: a body, or all fluid
 
@@ -58,7 +59,7 @@ _QUANTITIES = (
     Quantity(
         "displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area", rigid=("at",)
     ),
-    Quantity("velocity", _SPEED, "vector", ("at",), ("at",), ("dynamics",), rigid=("at",)),
+    Quantity("velocity", _SPEED, "vector", ("at",), ("at", "box"), ("dynamics",), rigid=("at",)),
     Quantity("acceleration", (1, 0, -2), "vector", ("at",), needs=("dynamics",)),
     Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs on the bodies"),
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
@@ -77,7 +78,7 @@ _QUANTITIES = (
         _STRESS,
         "one",
         ("pair",),
-        ("at", "on", "plane", WHOLE),
+        ("at", "on", "plane", "box", WHOLE),
         meaning="of a patch or a plane the mean over its area, of all fluid the `extreme`",
     ),
     Quantity("contact_area", (2, 0, 0), "one", ("pair",), meaning="area in which a pair touches"),
@@ -92,7 +93,7 @@ _QUANTITIES = (
         "angular_momentum", (2, 1, -1), "axis", (WHOLE,), needs=("density",), meaning="about the origin", rigid=(WHOLE,)
     ),
     Quantity("mass", (0, 1, 0), "one", (WHOLE,), needs=("density",), rigid=(WHOLE,)),
-    Quantity("volume", (3, 0, 0), "one", (WHOLE,), (WHOLE,)),
+    Quantity("volume", (3, 0, 0), "one", (WHOLE,), ("box", WHOLE)),
     Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass", rigid=(WHOLE,)),
     Quantity(
         "flow_rate",
@@ -108,7 +109,7 @@ _QUANTITIES = (
     Quantity("power", _POWER, "one", (), (WHOLE,), ("body",), "of that force, with the velocity of its surface"),
     Quantity("drag_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
     Quantity("lift_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
-    Quantity("kinetic_energy", _ENERGY, "one", (), (WHOLE,), meaning="of all fluid"),
+    Quantity("kinetic_energy", _ENERGY, "one", (), ("box", WHOLE), meaning="of all fluid"),
     Quantity("dissipation", _POWER, "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
 )
 QUANTITIES = {quantity.name: quantity for quantity in _QUANTITIES}
@@ -126,6 +127,7 @@ def _lines(field: Field) -> Iterator[str]:
         "pair": "with `pair`, of a contact pair",
         "through": "with `through`, through a patch",
         "plane": "with `plane`, through the part of a plane, in 2D of a line, that is in the fluid",
+        "box": "with `box`, of the fluid in it, of velocity and pressure the mean",
         WHOLE: "with none of them, of the whole",
     }
     for place, beginning in words.items():

@@ -78,7 +78,7 @@ def _refined(case: Case, grid: Grid) -> Nested:
         if (close & nested.coarse).any():
             message = (
                 f"body '{name}' comes within {FINE_LAYERS} cells of cells that are not of the finest level, "
-                f"{section.levels}: refine around it, or in a box over all of its way"
+                f"{section.levels}: refine around it with {FINE_LAYERS} layers or more, or in a box over all of its way"
             )
             raise case.error(("fluid", "grid", "refine"), message)
     return nested

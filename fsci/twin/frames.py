@@ -174,7 +174,8 @@ class _Sections:
         return {"on": [self.face(face) for face in patch.on]}
 
     def probe(self, probe: Probe) -> dict[str, Any]:
-        return {} if probe.reference is None else {"reference": self.reference(probe.reference)}
+        box = {} if probe.box is None else {"box": self.corners([self.vector(corner) for corner in probe.box])}
+        return box | ({} if probe.reference is None else {"reference": self.reference(probe.reference)})
 
     def reference(self, reference: Reference) -> dict[str, Any]:
         """With the directions, whose defaults are those of the axes."""
@@ -206,8 +207,12 @@ class _Sections:
     def refinement(self, given: dict[str, Any]) -> dict[str, Any]:
         if given.get("box") is None:
             return given
-        corners = list(zip(*given["box"], strict=True))
-        return given | {"box": [[min(ends) for ends in corners], [max(ends) for ends in corners]]}
+        return given | {"box": self.corners(given["box"])}
+
+    def corners(self, box: Sequence[Sequence[float]]) -> list[list[float]]:
+        """The lowest corner and the highest one."""
+        by_axis = list(zip(*box, strict=True))
+        return [[min(ends) for ends in by_axis], [max(ends) for ends in by_axis]]
 
     def vector(self, values: Sequence[Any]) -> list[Any]:
         return [self.signed(self.frame.sign[new], values[old]) for new, old in self.places(values)]

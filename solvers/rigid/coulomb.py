@@ -32,7 +32,8 @@ NO_FORCES = "the friction of rigid bodies has no contact forces"
 #: this factor in each; from 1e2 to 1e5 results are the same.
 PROXIMAL = 1e3
 
-#: Change of the contact forces in a proximal step, relative to the largest, at which they are found.
+#: Change of the contact forces in a proximal step, relative to the largest, at which they are found; or, where forces
+#: vanish, relative to r times the motions, whose rounding errors it is then.
 FOUND = 1e-13
 
 #: The same, from which on rounding errors may keep them from changing less.
@@ -247,6 +248,8 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
         raise StepFailed("rigid bodies", FailureKind.NO_ROOM, NO_MOTION)
     z = np.zeros_like(w0) if start is None else start * (r > 0.0)[:, None]
     system = _System(K, f, touch, w0)
+    ways = np.abs(w0) + Touch(np.abs(touch.B), touch.body, touch.friction).motion(np.abs(free))
+    sizes = r[:, None] * ways.max(axis=1, keepdims=True)
     u, share, change = free, FIRST_SHARE if start is None else 10.0 * FIRST_SHARE, np.full_like(w0, np.inf)
     for _ in range(PROXIMAL_STEPS):
         solved = _proximal_step(system, share * r, z, u)
@@ -257,7 +260,7 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
         z = project(before - share * r[:, None] * system.motion(u), touch.friction)[0]
         change = (z - before) / share
         way = float((r * np.linalg.norm(system.motion(u) - system.motion(free), axis=1)).max())
-        if _found(z, change, last, share, way):
+        if (np.abs(change) <= FOUND * sizes).all() or _found(z, change, last, share, way):
             return u, z
         slow = float(np.abs(change).max()) > SLOW_CHANGE * float(np.abs(last).max())
         share = min(LARGEST_SHARE if slow else max(1.0, share), SHARE_GROWTH * share)

@@ -67,9 +67,12 @@ class Closed:
         for tried in (offset, np.zeros_like(offset)):  # bodies that are wedged may have none that fit their rotation
             try:
                 z = contact_forces(self.mass, self.force - self.gyroscopic, touch, tried, self.z[staying])[1]
-            except StepFailed:
+            except StepFailed as error:
+                failed = error
                 continue
             return self.force + touch.force(z, len(self.force))
+        if not (staying & slides).any():
+            raise failed
         raise StepFailed("rigid bodies", FailureKind.JAMMED, self._paradox(staying & slides))
 
     def _paradox(self, sliding: NDArray[np.bool_]) -> str:

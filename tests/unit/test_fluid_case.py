@@ -233,6 +233,30 @@ MISTAKES = [
         "{point",
     ),
     (
+        "quantity: flow_rate, through: outlet",
+        "quantity: pressure, box: [[1, 0.5], [2, 0.5]]",
+        "19:34: give the lowest corner first: along y 0.5 is not below 0.5",
+        "[[1, 0.5]",
+    ),
+    (
+        "quantity: flow_rate, through: outlet",
+        "quantity: pressure, box: [[4, 0.5], [5, 0.7]]",
+        "19:34: this box is outside of that of the fluid",
+        "[[4",
+    ),
+    (
+        "quantity: flow_rate, through: outlet",
+        "quantity: pressure, box: [[1, 0.5], [2, 0.7, 1]]",
+        "19:45: a corner must have 2 entries in 2D, not 3",
+        "[2, 0.7",
+    ),
+    (
+        "through: outlet",
+        "box: [[1, 0.5], [2, 0.7]]",
+        "19:35: quantity 'flow_rate' needs 'through: PATCH' or 'plane: {point: [..], normal: [..]}'",
+        "[[1",
+    ),
+    (
         "through: outlet",
         "through: outlet, plane: {point: [1, 0.5], normal: [1, 0]}",
         "19:54: give either 'through' or 'plane', not both",

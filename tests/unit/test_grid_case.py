@@ -118,8 +118,8 @@ def test_refined_grids():
     assert f"40 x 10 cells, in parts halved 2 times: {len(grid.first):,} in all" in text
     assert f"{2 * grid.unknowns(2) + grid.unknowns(1):,} with" in text
     coarse = refined.replace("level: 2", "layers: 2")
-    message = "body 'cylinder' comes within 3 cells of cells that are not of the finest level, 1: refine around it, "
-    message += "or in a box over all of its way"
+    message = "body 'cylinder' comes within 3 cells of cells that are not of the finest level, 1: refine around it "
+    message += "with 3 layers or more, or in a box over all of its way"
     with pytest.raises(CaseError, match=f"case.yaml:6:61: {message}"):
         read_grid(load(coarse))
     assert [str(p).splitlines()[0] for p in check_meshes(load(coarse)).problems] == [f"case.yaml:6:61: {message}"]

@@ -11,6 +11,7 @@ from fsci.schema import reference_markdown
 
 WHERE = {"at": [0.5, 0.5], "on": "left", "pair": "touch", "through": "outlet"}
 WHERE["plane"] = {"point": [0.5, 0.5], "normal": [1, 0]}
+WHERE["box"] = [[0.2, 0.3], [0.5, 0.5]]
 UNITS = {"length": "mm", "mass": "t", "time": "s"}
 
 

@@ -118,7 +118,7 @@ def _values(fluid: Fluid, dofs: Numbers, degree: int, reference: Array) -> Array
 
 def open_section(fluid: Fluid, plane: CrossingPlane) -> tuple[Numbers, Array, Array]:
     """Gauss points of the part of a plane in the fluid: (local cells, reference points (n, dim), weights [m^2])."""
-    low, high = _bounds(fluid)
+    low, high = cell_bounds(fluid)
     edges = _edges(plane, fluid.cut.motion.x[fluid.cut.facets])
     parts = [_points(fluid, plane, cells, low, high, some) for cells, some in (
         (fluid.cut.uncut, edges[:0]), (fluid.cut.cut, edges),
@@ -154,7 +154,7 @@ def _points(
     return parts.cells[np.repeat(part_of[line], len(nodes))], x, weights.ravel()
 
 
-def _bounds(fluid: Fluid) -> tuple[Array, Array]:
+def cell_bounds(fluid: Fluid) -> tuple[Array, Array]:
     """Lowest and highest corners [m] of the local cells."""
     grid = fluid.grid
     if grid.nested is not None:
