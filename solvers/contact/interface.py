@@ -15,10 +15,11 @@ from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.friction import FrictionBound
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
-from solvers.contact.mortar import FacetSearch, Masters, Mortar, join_masters
+from solvers.contact.mortar import FacetSearch, Mortar, join_masters
 from solvers.contact.pair import Pair
 from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
 from solvers.contact.self_search import SelfSearch
+from solvers.contact.shared_facets import parts_of_slave
 from solvers.contact.shared_nodes import SearchApart, shared_nodes
 from solvers.contact.surface import ContactNodes, Surface, longest_edge, number_nodes
 from solvers.mesh.search import Search
@@ -97,8 +98,8 @@ def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
     multipliers = number_multipliers(slaves, [numbers[id(slave)] for slave in slaves], nodes, law_of_slave)
     laws = _multipliers_by_law(multipliers, law_of_slave)
     mortars: list[Mortar] = []
-    for k, slave in enumerate(slaves):
-        mortars += _mortars_of(slave, k, pairs, numbers, multipliers)
+    for k in range(len(slaves)):
+        mortars += _mortars_of(slaves, k, pairs, numbers, multipliers)
     return ContactInterface(
         pairs=tuple(pairs),
         surfaces=tuple(surfaces),
@@ -155,41 +156,41 @@ def _shared(
 
 
 def _mortars_of(
-    slave: Surface,
-    index: int,
+    slaves: Sequence[Surface],
+    k: int,
     pairs: Sequence[Pair],
     numbers: dict[int, NDArray[np.int64]],
     multipliers: Multipliers,
 ) -> list[Mortar]:
-    patch = multipliers.patches[multipliers.patch_of_surface[index]]
-    facets = multipliers.facets_of_surface[index]
-    edge = longest_edge(slave.corners)
+    """The mortars of the facets of slave k that no earlier slave has, against the masters of all slaves that have them.
+
+    Facets are integrated once, each part of them against the master in front, also where they are in several slaves.
+    """
+    patch = multipliers.patches[multipliers.patch_of_surface[k]]
     found = []
-    for integration in ("segments", "elements"):
-        mine = [i for i, pair in enumerate(pairs) if pair.slave is slave and pair.integration == integration]
-        mine.sort(key=lambda i: pairs[i].master is not slave)  # in self contact its own facets come first
-        masters = [pairs[i].master for i in mine]
-        for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
-            search: FacetSearch
-            if masters[0] is slave and mine[0] in joined.pair:
-                search = SelfSearch(slave.facets, slave.facet_type, slave.points, joined.facets[len(facets) :])
-            else:
-                search = Search(facets, joined.facets)
-                if len(np.intersect1d(numbers[id(slave)], joined.nodes)):
-                    search = SearchApart(search, patch.nodes[facets], joined.nodes[joined.facets])
-            deep = _deep_facets(joined, pairs)
-            found.append(Mortar(patch, facets, edge, joined, integration, search, deep))
+    for part in parts_of_slave(slaves, k, pairs, multipliers):
+        owners = [slaves[i] for i in part.slaves]
+        edge = max(longest_edge(owner.corners) for owner in owners)
+        for integration in ("segments", "elements"):
+            mine = [
+                i
+                for i, pair in enumerate(pairs)
+                if pair.integration == integration and any(pair.slave is owner for owner in owners)
+            ]
+            mine.sort(key=lambda i: pairs[i].master is not slaves[k])  # in self contact its own facets come first
+            masters = [pairs[i].master for i in mine]
+            for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
+                search: FacetSearch
+                if masters[0] is slaves[k] and mine[0] in joined.pair:
+                    own = len(part.facets)
+                    search = SelfSearch(owners[0].facets, owners[0].facet_type, owners[0].points, joined.facets[own:])
+                else:
+                    search = Search(part.facets, joined.facets)
+                    if len(np.intersect1d(patch.nodes[part.facets], joined.nodes)):
+                        search = SearchApart(search, patch.nodes[part.facets], joined.nodes[joined.facets])
+                deep = part.deep_facets(joined, pairs)
+                found.append(Mortar(patch, part.facets, edge, joined, integration, search, deep))
     return found
-
-
-def _deep_facets(joined: Masters, pairs: Sequence[Pair]) -> NDArray[np.int32]:
-    """Facets that lie deep in each other at the start, those of masters in the numbers of the joined ones, (p, 2)."""
-    found = [np.empty((0, 2), dtype=np.int32)]
-    for pair in np.unique(joined.pair_of_facet).tolist():
-        deep = pairs[pair].deep
-        if deep is not None:
-            found.append(deep + np.array([0, np.argmax(joined.pair_of_facet == pair)], dtype=np.int32))
-    return np.concatenate(found)
 
 
 def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:

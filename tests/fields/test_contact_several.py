@@ -9,6 +9,7 @@ from mortar_surfaces import all_pairs, patch
 from scipy.optimize import brentq
 from structure_setup import constant, vector
 
+from coupling.contact_surfaces import contact_surface
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.kernels import mortar, nodal_normals
@@ -133,6 +134,29 @@ def test_the_nearest_of_masters_in_layers_counts(cell_type, behind):
     assert found[1][1] == pytest.approx(found[0][1], rel=1e-12)
     assert np.array_equal(contact.resultant(1), np.zeros(dim))
     assert found[1][2] == found[0][2]
+
+
+@pytest.mark.parametrize("cell_type", ["quad", "quad9", "hexahedron", "tetra"])
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_master_behind_another_one_with_the_same_facets_of_the_slave_in_two_surfaces(cell_type, first):
+    """It changes nothing, in either order, if its slave is another surface with some of the facets, or has them all."""
+    dim = 2 if cell_type.startswith("quad") else 3
+    down = Support("top", (*[ZERO] * (dim - 1), constant(-0.02)))
+    found = []
+    for chosen in (None, slice(None), slice(1)):
+        body = make_body("block", brick(cell_type, 2, [1.0] * dim, [0.0] * dim, 0.0), supports=[down])
+        slave, near, far = contact_surface([body], "block", "bottom"), wall(dim, dim - 1), wall(dim, dim - 1)
+        far = replace(far, name="far", points=far.points - 0.1 * np.eye(dim)[-1])
+        pairs = [(slave, near)]
+        if chosen is not None:
+            pairs.insert(first, (replace(slave, name="again", facets=slave.facets[chosen].copy()), far))
+        structure, contact = make_contact([body], pairs)
+        solve_step(structure)
+        which = next(k for k, pair in enumerate(contact.pairs) if pair.master is near)
+        found.append((structure.now.u.copy(), contact.resultant(which)))
+    for u, force in found[1:]:
+        assert u == pytest.approx(found[0][0], abs=1e-12)
+        assert force == pytest.approx(found[0][1], rel=1e-12)
 
 
 @pytest.mark.parametrize("integration", ["segments", "elements"])
