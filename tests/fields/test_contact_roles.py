@@ -94,6 +94,26 @@ def test_a_press_fit_into_a_stiff_ring(cells, slave):
     assert radial.mean() == pytest.approx(exact, rel=0.01)
 
 
+@pytest.mark.parametrize(("count", "few"), [(8, 17), (24, 25)], ids=["coarse", "fine"])
+def test_a_rigid_slave_is_pressed_at_no_more_nodes_than_the_master_has(count, few):
+    """Gaps of a rigid slave are functions of the master's 25 nodes: of 49 conditions the others follow and are open.
+
+    Hence pressures of a stiff slave that is finer than its master vary from node to node, and their sum is right. One
+    that is coarser has the pressure of thick rings.
+    """
+    structure, _ = press_fit((12, count), "outer")
+    contact = structure.constraint
+    solve_step(structure)
+    assert contact.active_set.active.sum() == few
+    pressures = np.einsum("nd,nd->n", contact.z, contact.terms.normals)
+    pressure = OVERLAP / 2.0 / ((0.91 / 1e3) * ((1 + 4) / (4 - 1) - 0.3 / 0.7))
+    assert pressures.min() > -1e-9 * pressure
+    quarter = 2.0 * np.pi / 2.0  # of the circle of radius 2
+    assert contact.terms.D @ pressures == pytest.approx(pressure * quarter, rel=0.005)
+    if count == 8:
+        assert pressures[contact.active_set.active] == pytest.approx(np.full(few, pressure), rel=0.03)
+
+
 def strip_on_a_corner(order, edge, settings=SETTINGS):
     """A thin strip, held at both ends, above a rigid step whose corner is at `edge`: (structure, contact)."""
     load = Traction("top", (ZERO, lambda x, t: np.full(x.shape[1], -0.025 * t)))
