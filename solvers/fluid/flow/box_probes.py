@@ -23,9 +23,9 @@ from solvers.mesh.gauss import gauss, tensor_weights
 from solvers.mesh.tessellation import unit_normals
 
 #: Cells that are integrated together, which limits memory.
-BATCH = 20_000
+CELLS_AT_ONCE = 20_000
 #: Faces of the box as near to a plane of the grid as this, in parts of the grid's extent, are in it.
-IN_PLANE = 1e-12
+FACE_IN_PLANE = 1e-12
 
 
 class CrossesThinBody(ValueError):
@@ -48,8 +48,8 @@ class Parts:
         dim = self.low.shape[1]
         lattice = np.meshgrid(*[gauss(self.points)[0]] * dim, indexing="ij")
         at, weights = np.stack([x.ravel(order="F") for x in lattice], axis=1), tensor_weights(self.points, dim)
-        for start in range(0, len(self.cells), BATCH):
-            some = slice(start, start + BATCH)
+        for start in range(0, len(self.cells), CELLS_AT_ONCE):
+            some = slice(start, start + CELLS_AT_ONCE)
             share = weights if self.fluid is None else weights * self.fluid[some]
             size = (self.high - self.low)[some, None]
             yield self.cells[some], self.low[some, None] + size * at, self.volume[some, None] * share
@@ -67,7 +67,7 @@ def box_probe(
     for axis, edge in enumerate(fluid.grid.grid.edges):
         for end in range(2):
             nearest = edge[np.abs(edge - ends[end, axis]).argmin()]
-            if abs(nearest - ends[end, axis]) <= IN_PLANE * (edge[-1] - edge[0]):
+            if abs(nearest - ends[end, axis]) <= FACE_IN_PLANE * (edge[-1] - edge[0]):
                 ends[end, axis] = nearest
             elif fluid.grid.sheets is not None and edge[0] < ends[end, axis] < edge[-1]:
                 raise CrossesThinBody(
