@@ -23,9 +23,9 @@ from solvers.mesh.gauss import gauss, tensor_weights
 from solvers.mesh.tessellation import unit_normals
 
 #: Cells that are integrated together, which limits memory.
-BATCH = 20_000
+MOST_CELLS_IN_BATCH = 20_000
 #: Faces of the box as near to a plane of the grid as this, in parts of the grid's extent, are in it.
-IN_PLANE = 1e-12
+FACE_AT_PLANE = 1e-12
 
 
 class CrossesThinBody(ValueError):
@@ -33,8 +33,8 @@ class CrossesThinBody(ValueError):
 
 
 @dataclass(frozen=True)
-class Parts:
-    """Parts of cells in the box, each with the Gauss points of a tensor rule."""
+class PartsInBox:
+    """PartsInBox of cells in the box, each with the Gauss points of a tensor rule."""
 
     cells: Indices  #: local cells
     low: Array  #: lowest corners of the parts, in the coordinates from 0 to 1 of the cells, shape (n, dim)
@@ -48,8 +48,8 @@ class Parts:
         dim = self.low.shape[1]
         lattice = np.meshgrid(*[gauss(self.points)[0]] * dim, indexing="ij")
         at, weights = np.stack([x.ravel(order="F") for x in lattice], axis=1), tensor_weights(self.points, dim)
-        for start in range(0, len(self.cells), BATCH):
-            some = slice(start, start + BATCH)
+        for start in range(0, len(self.cells), MOST_CELLS_IN_BATCH):
+            some = slice(start, start + MOST_CELLS_IN_BATCH)
             share = weights if self.fluid is None else weights * self.fluid[some]
             size = (self.high - self.low)[some, None]
             yield self.cells[some], self.low[some, None] + size * at, self.volume[some, None] * share
@@ -67,7 +67,7 @@ def box_probe(
     for axis, edge in enumerate(fluid.grid.grid.edges):
         for end in range(2):
             nearest = edge[np.abs(edge - ends[end, axis]).argmin()]
-            if abs(nearest - ends[end, axis]) <= IN_PLANE * (edge[-1] - edge[0]):
+            if abs(nearest - ends[end, axis]) <= FACE_AT_PLANE * (edge[-1] - edge[0]):
                 ends[end, axis] = nearest
             elif fluid.grid.sheets is not None and edge[0] < ends[end, axis] < edge[-1]:
                 raise CrossesThinBody(
@@ -115,7 +115,7 @@ def _integral(fluid: Fluid, quantity: str, cells: Indices, reference: Array, wei
     return total
 
 
-def _parts(fluid: Fluid, ends: Array) -> Iterator[Parts]:
+def _parts(fluid: Fluid, ends: Array) -> Iterator[PartsInBox]:
     """The parts of this process's cells in the box: full cells, whole cut ones, and parts of cut ones."""
     corners = cell_bounds(fluid)
     low, high = np.maximum(corners[0], ends[0]), np.minimum(corners[1], ends[1])
@@ -123,9 +123,9 @@ def _parts(fluid: Fluid, ends: Array) -> Iterator[Parts]:
     whole = ((low == corners[0]) & (high == corners[1])).all(axis=1)
     size = corners[1] - corners[0]
 
-    def parts(cells: Indices, points: int, share: Array | None) -> Parts:
+    def parts(cells: Indices, points: int, share: Array | None) -> PartsInBox:
         first, last = (low - corners[0])[cells] / size[cells], (high - corners[0])[cells] / size[cells]
-        return Parts(cells, first, last, (high - low)[cells].prod(axis=1), points, share)
+        return PartsInBox(cells, first, last, (high - low)[cells].prod(axis=1), points, share)
 
     owned = fluid.grid.owned
     uncut = fluid.cut.uncut[inside[fluid.cut.uncut] & (fluid.cut.uncut < owned)]
@@ -139,7 +139,7 @@ def _parts(fluid: Fluid, ends: Array) -> Iterator[Parts]:
 
 
 def _cut_again(fluid: Fluid, ends: Array, middle: Array) -> Array:
-    """Shares of fluid, as `Parts.fluid`, of parts of cut cells, which are of the finest level; middle: theirs [m]."""
+    """Shares, as `PartsInBox.fluid`, of parts of cut cells, which are of the finest level; middle: theirs [m]."""
     points, dim = fluid.system.weights.points, fluid.dim
     weights = tensor_weights(len(points), dim)
     if not len(middle):
