@@ -27,7 +27,7 @@ from fsci.builder.solver import build_tolerance
 from fsci.builder.wall_pairs import wall_pairs
 from fsci.case import Case
 from fsci.case.coupling_checks import level_unknown
-from fsci.meshes.of_case import require_inside_period
+from fsci.meshes.of_case import require_shorter_than_period
 from solvers.api import Array
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.surfaces.immersed import ImmersedBody
@@ -130,7 +130,7 @@ def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Closing | None]
     found = comm.bcast(found, root=0)
     if isinstance(found, Exception):
         raise found
-    require_inside_period(case, ("structure", "bodies", body.name), found[0].points)
+    require_shorter_than_period(case, ("structure", "bodies", body.name), found[0].points)
     return found
 
 

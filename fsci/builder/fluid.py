@@ -19,7 +19,8 @@ from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import finite, rigid_motion
 from fsci.meshes.nested import following, read_grid
-from fsci.meshes.of_case import read_rigid_body, require_inside_period
+from fsci.meshes.of_case import read_rigid_body, require_shorter_than_period
+from solvers.api import StepFailed
 from solvers.fluid.flow import probes
 from solvers.fluid.flow.box_probes import CrossesThinBody, box_probe
 from solvers.fluid.flow.extreme_pressure import extreme_pressure
@@ -57,6 +58,8 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     except UncoveredFaces as error:
         faces = ", ".join(error.faces)
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
+    except StepFailed as error:  # thin bodies at rest at periodic faces
+        raise case.error(("fluid", "bodies"), error.reason) from None
 
 
 def _grid(case: Case, comm: MPI.Comm) -> Grid:
@@ -130,10 +133,10 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
     points, facets = read_surface(case, name, comm)
     movement = case.fluid.bodies[name].motion
     if movement is None:
-        require_inside_period(case, ("fluid", "bodies", name), points)
+        require_shorter_than_period(case, ("fluid", "bodies", name), points)
         return rigid_body(name, points, facets)
     moved = finite(rigid_motion(points, movement, case.time.start, case.time.step), name)
-    require_inside_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
+    require_shorter_than_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
     return rigid_body(name, points, facets, moved)
 
 

@@ -17,7 +17,7 @@ from fsci.case import Case
 from fsci.case.free_body import HELD, FreeMotion, PointSpringSection, RigidDynamics, RigidLoadSection
 from fsci.case.values import value_of
 from fsci.expression import Expression
-from fsci.meshes.of_case import require_inside_period
+from fsci.meshes.of_case import require_shorter_than_period
 from solvers.api import Array
 from solvers.generalised_alpha import BACKWARD_EULER, GeneralisedAlpha
 from solvers.rigid import probes
@@ -62,7 +62,7 @@ def _static(case: Case) -> bool:
 def _body(case: Case, name: str, settings: FreeMotion, comm: MPI.Comm) -> RigidBody:
     points, facets = read_surface(case, name, comm)
     if case.fluid is not None:
-        require_inside_period(case, ("fluid", "bodies", name), points)
+        require_shorter_than_period(case, ("fluid", "bodies", name), points)
     spin = [radians(rate) for rate in settings.initial_angular_velocity or ()]
     inertia = inertia_of_surface(points, facets, settings.density)
     body = RigidBody(

@@ -30,7 +30,7 @@ from fsci.meshes.of_case import (
     read_obstacle,
     read_rigid_body,
     reading_once,
-    require_inside_period,
+    require_shorter_than_period,
     slave_surfaces,
 )
 from solvers.fluid.flow.conservation.cavities import components, enclosed
@@ -239,7 +239,7 @@ def _wet(case: Case, found: Findings, keys: Keys, mesh: Mesh) -> None:
     name = str(keys[-1])
     skin = found.attempt(partial(find_skin, case, name, mesh))
     if skin is not None:
-        found.attempt(partial(require_inside_period, case, keys, skin[0].points))
+        found.attempt(partial(require_shorter_than_period, case, keys, skin[0].points))
     if isinstance(case.elastic_bodies[name].mesh, FileMesh):
         _against_grid(case, found, keys, mesh, moves=True)
 
@@ -274,7 +274,7 @@ def _rigid(case: Case, found: Findings) -> None:
             if turns and case.fluid.scheme != "steady" and (warning := fast_body(case, case.fluid, body.motion, x)):
                 found.warnings.append(f"{case.place(*keys, 'motion')}: {warning}")
             x = rigid_motion(x, body.motion, case.time.start, case.time.step)(case.time.start)[0]
-        found.attempt(partial(require_inside_period, case, keys, x))
+        found.attempt(partial(require_shorter_than_period, case, keys, x))
         if isinstance(body.mesh, FileMesh):
             _against_grid(case, found, keys, mesh, moves=body.motion is not None)
         surfaces.append(ImmersedSurface(name, facets, len(x)))

@@ -81,17 +81,36 @@ class Places:
     def solid(self, surface: Surface) -> Array:
         """Share of solid of each cell of the grid, without its finer cells, one axis per direction."""
         from solvers import kernels
+        from solvers.api import StepFailed
+        from solvers.fluid.cut.images import Periods
         from solvers.fluid.geometry.pieces import in_planes
         from solvers.fluid.grid.box import Grid
 
         grid = Grid(self.fluid.grid.planes)
-        moments = kernels.moments(grid.edges, np.array([0.25, 0.75]), in_planes(grid, surface[0]), surface[1])
+        try:
+            images = Periods(grid, self.periodic).images(surface[1], surface[0], 0)
+        except StepFailed as error:  # as long as the period
+            raise self.case.error(("fluid", "bodies"), error.reason) from None
+        moments = kernels.moments(grid.edges, np.array([0.25, 0.75]), in_planes(grid, images.x), images.facets)
         return np.nan_to_num(grid.as_box(moments.fraction))
 
     def reach_boundary(self, points: Array) -> bool:
-        """Whether a body is not strictly inside of the box."""
+        """Whether a body is not strictly inside of the box; along a period it is anywhere."""
+        return not self.inside(points).all()
+
+    @property
+    def periodic(self) -> tuple[int, ...]:
+        """Periodic axes of the box."""
+        faces = {face for patch in self.fluid.patches.values() if patch.periodic for face in patch.on}
+        return tuple(sorted({"xyz".index(face[0]) for face in faces}))
+
+    def inside(self, points: Array) -> NDArray[np.bool_]:
+        """Mask of points inside of the box; along a period they are anywhere."""
         low, high = np.array(self.fluid.grid.start), np.array(self.fluid.grid.to)
-        return not ((points.min(axis=0) > low).all() and (points.max(axis=0) < high).all())
+        within = (points > low) & (points < high)
+        within[:, list(self.periodic)] = True
+        found: NDArray[np.bool_] = within.all(axis=1)
+        return found
 
     def covered(self) -> bool:
         """Whether the bodies fill the box at the start."""
@@ -234,9 +253,7 @@ def _displaced(places: Places, name: str, begin: float, end: float) -> tuple[flo
     planes = places.fluid.grid.planes
     volume = np.prod(np.stack(np.meshgrid(*(np.diff(plane) for plane in planes), indexing="ij")), axis=0)
     grown = float(((places.solid((after, facets)) - places.solid((before, facets))) * volume).sum())
-    low, high = np.array(places.fluid.grid.start), np.array(places.fluid.grid.to)
-    middles = after[facets].mean(axis=1)
-    inside = ((middles > low) & (middles < high)).all(axis=1)
+    inside = places.inside(after[facets].mean(axis=1))
     area = np.linalg.norm(area_vectors(after[facets]), axis=1)
     speed = np.linalg.norm(velocity[facets].mean(axis=1), axis=1)
     rate = -grown / (end - begin)

@@ -25,6 +25,7 @@ from fsci.meshes.finite_values import require_finite
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
 from fsci.meshes.valid import BadMesh, require_positive, require_valid
+from solvers.fluid.grid.box import FLUSH
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.tessellation import is_closed, tessellate
 from solvers.mesh.topology import surface_facets
@@ -205,13 +206,13 @@ def read_rigid_side(case: Case, name: str) -> tuple[Mesh, tuple[str, ...] | None
     return read_rigid_body(case, name)[0], case.rigid_surfaces[name].on
 
 
-def require_inside_period(case: Case, keys: Keys, points: Array) -> None:
-    """Bodies stay out of the first and the last layer of cells of a period. Raises CaseError."""
+def require_shorter_than_period(case: Case, keys: Keys, points: Array) -> None:
+    """Bodies may be anywhere along a period, but as long as it they would meet their images. Raises CaseError."""
     assert case.fluid is not None
     for axis in sorted({face[0] for patch in case.fluid.patches.values() if patch.periodic for face in patch.on}):
         index = "xyz".index(axis)
         planes = case.fluid.grid.edges(index)
-        if points[:, index].min() < planes[1] or points[:, index].max() > planes[-2]:
-            inside = f"{planes[1]:g} to {planes[-2]:g}"
-            message = f"the body must lie within the period along {axis}, without the cells at its ends: {inside}"
+        length, period = float(np.ptp(points[:, index])), float(planes[-1] - planes[0])
+        if length >= period - FLUSH * float(np.diff(planes).min()):
+            message = f"the body must be shorter than the period along {axis}, {period:g}: it has {length:g}"
             raise case.error(keys, message)

@@ -247,18 +247,6 @@ def test_mistakes_that_only_meshes_show(old, new, message, tmp_path):
     assert str(caught.value).startswith(f"{tmp_path}/case.yaml:{message}")
 
 
-def test_a_body_at_the_end_of_a_period(tmp_path):
-    ends = "    ends: {on: [x-, x+], periodic: true}\n  bodies:"
-    text = (
-        MOVING.replace("[x-, x+, y-, y+]", "[y-, y+]").replace("  bodies:", ends).replace("[0.3, 0.5]", "[0.15, 0.5]")
-    )
-    (tmp_path / "case.yaml").write_text(text)
-    with pytest.raises(CaseError) as caught:
-        run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
-    rule = "the body must lie within the period along x, without the cells at its ends: 0.0666667 to 1.93333"
-    assert str(caught.value).startswith(f"{tmp_path}/case.yaml:16:5: {rule}")
-
-
 # ---------------------------------------------------------------------------------------------- surfaces and motions
 
 

@@ -12,6 +12,7 @@ from solvers import kernels
 from solvers.api import Array, Indices32
 from solvers.fluid.cut.film import Films, Walls, creeping_cells, walls_of
 from solvers.fluid.cut.gaps import GapFinder, NarrowGaps
+from solvers.fluid.cut.images import Images, Periods
 from solvers.fluid.geometry.overlaps import Unions
 from solvers.fluid.geometry.pieces import (
     NOTHING,
@@ -48,6 +49,7 @@ class Cut:
     strip: Indices32  #: solid cells behind the surface to which the flow is extended
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
     contact_cells: Indices32  #: solid cells where surfaces touch each other or the box's boundary
+    special: NDArray[np.bool_]  #: cells of the box that were cut, or of the strip, in this step
     reach: NDArray[np.bool_]  #: local cells that the surfaces may cut or uncover in the next steps
     #: active cells of the whole mesh, for the cells that this process cuts: its own and those near
     is_active: NDArray[np.bool_]
@@ -61,6 +63,7 @@ class Cut:
     gaps: NarrowGaps | None  #: gaps of a few cells, with first-order velocities; None: there are none
     facets: NDArray[np.int64]
     motion: Motion
+    images: Images  #: of the surfaces, in the box and as far around it as the strip reaches
 
     @property
     def active(self) -> Indices32:
@@ -90,8 +93,11 @@ class Cutter:
         tied: NDArray[np.bool_] | None = None,
         closing: NDArray[np.bool_] | None = None,
         steady: bool = True,
+        periodic: tuple[int, ...] = (),
     ):
         """Masks of facets, None: of no one. tied: to another body; closing: whose slits stay closed in a step.
+
+        periodic: axes of the box. With `sheets` around thin bodies no surface has images.
 
         In a steady flow those stay closed that have touched, up to a width. An unsteady one has a history on each side:
         there a cell that loses its fluid for the second time in a step stays solid until the step ends. Fluid in a
@@ -99,6 +105,7 @@ class Cutter:
         """
         self.grid, self.points, self.films, self.gaps, self.unions = grid, points, films, gaps, unions
         self._tied, self._closing, self._steady = tied, closing, steady
+        self.periods, self._thin = Periods(grid.grid, periodic), grid.sheets is not None
         #: box cells in which surfaces touch in the latest cut, and those in which they did in this step, with `closing`
         self.closed, self._closed = (np.zeros(grid.grid.size, dtype=bool) for _ in range(2))
         self._open = np.full(grid.grid.size, steady)  #: box cells that had fluid in this step; steady: all
@@ -166,21 +173,28 @@ class Cutter:
         if grid.sheets is not None:
             self._special[:] = False  # a cell behind a thin body is one of its other side
         self._depth = max(self._depth, layers)
-        nearby = _grow(self._own, self._depth + MARGIN)
+        nearby = self._grow(self._own, self._depth + MARGIN)
         from_table = self.unions or grid.sheets is not None
+        images = self.periods.images(facets, motion.x, 0 if self._thin else self._depth + 1)
+        if self._thin:
+            images.require_bodies(facets, motion.x)
+        of, periodic = images.facet, self.periods.axes
+        bodies, facets, given, motion = facets, images.facets, motion, images.motion(motion)
+        tied, closing = (None if mask is None else mask[of] for mask in (self._tied, self._closing))
         x = without_slivers(box, facets, motion.x) if from_table else in_planes(box, motion.x)
         moments = kernels.moments(box.edges, self.points, x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
-        off = off_boundary(box, motion.x[facets])
-        counts = off if wet is None else off & wet
-        if self._tied is not None:
-            moments = without_slits(moments, self.points, self._tied, counts, self._slivers)
-        if self._closing is not None:
+        off = off_boundary(box, motion.x[facets], periodic)
+        counts = off & self.periods.inwards(images)
+        counts = counts if wet is None else counts & wet[of]
+        if tied is not None:
+            moments = without_slits(moments, self.points, tied, counts, self._slivers)
+        if closing is not None:
             still = self._closed & (moments.fraction > 1.0 - SLIT) if self._steady else self._shut
             moments = filled(moments, self.points, still)
         piece_normal = normal[moments.piece_facet]
         if self.unions:
-            moments, piece_normal = self._unions(moments, facets, x, normal, self._tied)
+            moments, piece_normal = self._unions(moments, facets, x, normal, tied)
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
@@ -189,14 +203,14 @@ class Cutter:
         if grid.sheets is not None:
             is_cut[grid.sheets.touching] = True  # where bodies overlap, the sum of their volumes may exceed the cell
         solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut  # surfaces that touch keep their cells: they may part
-        near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
+        near = self._grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
         self._special |= is_cut | strip
         touching = solid & (self._facing(moments, counts, piece_normal) | self._covered(motion.x[facets[~off]]))
-        if self._closing is not None:
+        if closing is not None:
             touching |= still
             self.closed = still.copy()
-            self.closed[moments.cells[moments.piece_cell[self._closing[moments.piece_facet]]]] = True
+            self.closed[moments.cells[moments.piece_cell[closing[moments.piece_facet]]]] = True
             self.closed &= touching
             self._shut |= self.closed & self._again
             self._again |= self._closed & ~solid
@@ -217,20 +231,26 @@ class Cutter:
         mine = np.flatnonzero((rows >= 0) & in_use[cells])
         mine = mine[np.argsort(rows[mine], kind="stable")]
         pieces = Pieces(
-            rows[mine], moments.piece_facet[mine], piece_moments[mine], moments.piece_mass[mine], piece_normal[mine]
+            rows[mine],
+            of[moments.piece_facet[mine]],
+            piece_moments[mine],
+            moments.piece_mass[mine],
+            piece_normal[mine],
+            moments.piece_facet[mine],
         )
         narrow = motion, facets, moments, piece_normal, np.where(touched & in_use[cells], cells, -1)
         film, gaps = self._film(*narrow, solid), self._gaps(*narrow, solid)
         share = np.where(is_active & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0)
         creeping = None if self._of_step is None else self._of_step.creeping
         if film is not None and self._of_step is None:
-            creeping = creeping_cells(box, film, solid, share)
+            creeping = creeping_cells(box, film, solid, share, periodic)
         found = Cut(
             uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
             ghost_faces=faces[special],
             contact_cells=np.flatnonzero(touching[grid.numbers]).astype(np.int32),
+            special=self._special.copy(),
             reach=self._reach(box.as_box(self._special), layers),
             is_active=is_active,
             share=share,
@@ -242,8 +262,9 @@ class Cutter:
             film=film,
             creeping=creeping,
             gaps=gaps,
-            facets=facets,
-            motion=motion,
+            facets=bodies,
+            motion=given,
+            images=images,
         )
         return found if grid.sheets is None else on_sheets(grid, self.points, found, counts)
 
@@ -251,7 +272,8 @@ class Cutter:
         """The cut without surfaces."""
         dim, points = self.grid.dim, len(self.points) ** self.grid.dim
         none, nothing = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64)
-        pieces = Pieces(nothing, nothing, np.empty((0, points, dim)), np.empty((0, dim, dim)), np.empty((0, dim)))
+        moments, mass, normal = np.empty((0, points, dim)), np.empty((0, dim, dim)), np.empty((0, dim))
+        pieces = Pieces(nothing, nothing, moments, mass, normal, nothing)
         everything = np.arange(len(self.grid.numbers), dtype=np.int32)
         return Cut(
             everything,
@@ -259,6 +281,7 @@ class Cutter:
             none,
             none,
             none,
+            np.zeros(self.grid.grid.size, dtype=bool),
             np.zeros(len(everything), dtype=bool),
             np.ones(self.grid.grid.size, dtype=bool),
             np.ones(self.grid.grid.size),
@@ -271,6 +294,7 @@ class Cutter:
             None,
             facets,
             motion,
+            Images(facets, motion.x, nothing, nothing, nothing),
         )
 
     def _film(self, motion: Motion, facets, moments, normal, cells, solid) -> Array | None:
@@ -292,7 +316,7 @@ class Cutter:
 
     def _reach(self, special: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
         """Cells with cut penalty and one layer around them; without the layer around bodies at rest."""
-        return _grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
+        return self._grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
 
     def _cut_cells(self, moments, cells, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Box cells that are cut, and those whose pieces of surface are more than slivers."""
@@ -303,7 +327,7 @@ class Cutter:
     def _facing(self, moments, counts, normal) -> NDArray[np.bool_]:
         """Box cells with surfaces that face each other, in them or in their faces: fluid enters if they separate."""
         number, across, size = (
-            moments.cells[moments.piece_cell], cells_across(self.grid.grid, self.points, moments), self.grid.grid.size
+            moments.cells[moments.piece_cell], cells_across(self.grid.grid, self.points, moments, self.periods.axes), self.grid.grid.size
         )  # fmt: skip
         area = moments.piece_mass.sum(axis=(1, 2)) * counts[moments.piece_facet]
         in_face = across >= 0
@@ -328,10 +352,19 @@ class Cutter:
         ends = np.array([[edge[0], edge[-1]] for edge in box.edges]).T
         way = layers * np.array([[edge[1] - edge[0], edge[-1] - edge[-2]] for edge in box.edges]).T
         near = ((high >= ends[0] - way[0]) & (low <= ends[1] + way[1])).all(axis=1)
-        beyond = ((high <= ends[0]) | (low >= ends[1])).any(axis=1) & near
+        closed = [axis for axis in range(box.dim) if axis not in self.periods.axes]
+        beyond = ((high <= ends[0]) | (low >= ends[1]))[:, closed].any(axis=1) & near
         marked = np.zeros(box.size, dtype=bool)
         marked[cells_between(box, low[beyond], high[beyond])] = True
-        return _grow(box.as_box(marked), layers - 1).ravel(order="F")
+        return self._grow(box.as_box(marked), layers - 1).ravel(order="F")
+
+    def _grow(self, marked: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
+        """Marked cells and so many layers of neighbours, across vertices and ends of periods."""
+        if layers == 0 or marked.all() or not self.periods.axes:
+            return _grow(marked, layers)
+        around = [(layers, layers) if axis in self.periods.axes else (0, 0) for axis in range(marked.ndim)]
+        grown = _grow(np.pad(marked, around, mode="wrap"), layers)
+        return grown[tuple(slice(a, n + a) for (a, _), n in zip(around, marked.shape, strict=True))]
 
     def _fluid_weights(self, moments, cut: Indices32) -> Array:
         """int_fluid L_q dx / (w_q |K|) on local cut cells, shape (cut, points)."""

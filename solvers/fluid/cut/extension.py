@@ -62,7 +62,10 @@ class Extension:
     """The extension of one lattice of nodes. Roots are fixed within a step, so that Newton's method converges."""
 
     def __init__(self, grid: Grid, degree: int, shape: tuple[int, ...], numbers: Indices, sheets: Sheets | None = None):
-        """numbers: the nodes of this process, in the lattice of this degree and shape, x fastest, or in `sheets`."""
+        """numbers: the nodes of this process, in the lattice of this degree and shape, x fastest, or in `sheets`.
+
+        Along periodic axes the shape does not count the last node, and cells at both ends are neighbours.
+        """
         self.grid, self.degree, self.shape, self._free = grid, degree, shape, FREE_SHARE[grid.dim]
         self._sheets = None if sheets is None else SheetWindows(sheets, degree, numbers)
         self.size = int(np.prod(shape)) if sheets is None else sheets.node_count(degree)  #: count of node numbers
@@ -134,10 +137,23 @@ class Extension:
 
     def _window(self, axis: int, nodes: Indices, layers: int) -> tuple[Indices, NDArray[np.bool_]]:
         """(indices, whether they exist) of cells in one direction, shape (nodes, 2 layers + 2)."""
+        index, exists = self._unrolled(axis, nodes, layers)
+        n = self.grid.shape[axis]
+        return index % n if self._is_periodic(axis) else np.clip(index, 0, n - 1), exists
+
+    def _unrolled(self, axis: int, nodes: Indices, layers: int) -> tuple[Indices, NDArray[np.bool_]]:
+        """The same with indices beyond the ends of a period."""
         m, n = self._index[nodes, axis, None], self.grid.shape[axis]
         index = m // self.degree + np.arange(-layers - 1, layers + 1)
-        exists = (index >= 0) & (index < n) & (index >= -(-m // self.degree) - 1 - layers)
-        return np.clip(index, 0, n - 1), exists
+        exists = index >= -(-m // self.degree) - 1 - layers
+        if self._is_periodic(axis):
+            exists &= index < index[:, :1] + n  # each cell once
+        else:
+            exists &= (index >= 0) & (index < n)
+        return index, exists
+
+    def _is_periodic(self, axis: int) -> bool:
+        return self._sheets is None and self.shape[axis] == self.degree * self.grid.shape[axis]
 
     def _largest(self, nodes: Indices, share: Array, layers: int) -> Array:
         """Largest share of fluid in the cells around nodes, with some further layers."""
@@ -193,8 +209,13 @@ class Extension:
         """Reference coordinates of nodes in the cells of `_window`: from 0 to 1 inside, shape (nodes, cells)."""
         index, _ = self._window(axis, nodes, layers)
         edge, m = self.grid.edges[axis], self._index[nodes, axis, None]
-        outside = (self._lattice[axis][m] - edge[index]) / (edge[index + 1] - edge[index])
-        local = m - self.degree * index
+        periods = np.zeros_like(index)
+        if self._is_periodic(axis):
+            unrolled = self._unrolled(axis, nodes, layers)[0]
+            periods = (unrolled - index) // self.grid.shape[axis]
+        x = self._lattice[axis][m] - periods * (edge[-1] - edge[0])
+        outside = (x - edge[index]) / (edge[index + 1] - edge[index])
+        local = m - self.degree * (index + self.grid.shape[axis] * periods)
         within = (local >= 0) & (local <= self.degree)
         return np.where(within, local / self.degree, outside)
 

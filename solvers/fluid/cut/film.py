@@ -49,23 +49,24 @@ class Films:
 
     faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
     penalty: float  #: gamma
+    periodic: tuple[int, ...] = ()  #: axes of the box
 
     def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
         """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film."""
         sizes, across = sizes_of(grid, walls)
-        gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across))
+        gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across, periodic=self.periodic))
         near = gap < (1.0 - FLUSH) * across  # a gap of one cell is no film, whatever the rounding
         if not near.any():
             return None
         ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST_RATIO)
         factor = np.ones(grid.size)
         np.minimum.at(factor, walls.cell[near], SHARE_OF_FILM * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
-        return with_solid(grid, factor, solid)
+        return with_solid(grid, factor, solid, self.periodic)
 
 
-def with_solid(grid: Grid, factor: Array, solid: NDArray[np.bool_]) -> Array:
+def with_solid(grid: Grid, factor: Array, solid: NDArray[np.bool_], periodic: tuple[int, ...] = ()) -> Array:
     """Factors of cells of the box; solid cells around those of a film get its factor: they share nodes with it."""
-    around: Array = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
+    around: Array = ndimage.minimum_filter(grid.as_box(factor), 3, mode=at_ends(grid, periodic)).ravel(order="F")
     return np.where(solid, around, factor)
 
 
@@ -111,18 +112,27 @@ def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, leng
     return Walls(cell[first][order], middle[order], n[order])
 
 
-def to_walls(grid: Grid, walls: Walls, reach: Array, layers: int = 1) -> Array:
+def at_ends(grid: Grid, periodic: tuple[int, ...]) -> list[str]:
+    """What filters of SciPy over the cells of the box do at its ends, by axis."""
+    return ["wrap" if axis in periodic else "reflect" for axis in range(grid.dim)]
+
+
+def to_walls(grid: Grid, walls: Walls, reach: Array, layers: int = 1, periodic: tuple[int, ...] = ()) -> Array:
     """Distance [m] through the fluid, along the normal, to the closest opposite wall in so many layers of cells around.
 
     Infinite where there is none within `reach` [m]. Surfaces at negative distance do not count: they are on the other
     side of the body.
     """
     index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"), axis=1)
-    a, b = cKDTree(index).query_pairs(layers, p=np.inf, output_type="ndarray").T
+    periods = [n if axis in periodic else 0 for axis, n in enumerate(grid.shape)]
+    a, b = cKDTree(index, boxsize=periods).query_pairs(layers, p=np.inf, output_type="ndarray").T
     opposing = np.einsum("ai,ai->a", walls.n[a], walls.n[b])
     a, b, opposing = (v[opposing < OPPOSITE] for v in (a, b, opposing))
     a, b, opposing = np.concatenate([a, b]), np.concatenate([b, a]), np.tile(opposing, 2)
     away = walls.x[a] - walls.x[b]
+    for axis in periodic:
+        length = grid.edges[axis][-1] - grid.edges[axis][0]
+        away[:, axis] -= length * np.round(away[:, axis] / length)
     distance = np.einsum("ai,ai->a", away, walls.n[b]) / opposing
     aside = away - distance[:, None] * walls.n[a]
     far = distance**2 + (aside**2).sum(axis=1)
@@ -135,14 +145,17 @@ def to_walls(grid: Grid, walls: Walls, reach: Array, layers: int = 1) -> Array:
     return gap
 
 
-def creeping_cells(grid: Grid, factor: Array, solid: NDArray[np.bool_], share: Array) -> NDArray[np.bool_]:
+def creeping_cells(
+    grid: Grid, factor: Array, solid: NDArray[np.bool_], share: Array, periodic: tuple[int, ...] = ()
+) -> NDArray[np.bool_]:
     """Cells of the box with creeping flow: those of films, and poorly cut ones at their ends.
 
     The latter share nodes behind the surface with the solid cells of films, hence the film's velocity continued. Its
     convection is as inexact as in the film, and steps had no solution with it.
     factor: of `Films`; solid: solid cells; share: of fluid; all by cells of the box.
     """
-    beside = ndimage.maximum_filter(grid.as_box(solid & (factor < 1.0)), 3).ravel(order="F")
+    of_films = grid.as_box(solid & (factor < 1.0))
+    beside = ndimage.maximum_filter(of_films, 3, mode=at_ends(grid, periodic)).ravel(order="F")
     return (factor < 1.0) | (beside & (share < FREE_SHARE[grid.dim]))
 
 

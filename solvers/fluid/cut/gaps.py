@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.cut.film import LEAST_RATIO, Walls, sizes_of, to_faces, to_walls, with_solid
+from solvers.fluid.cut.images import Periods
 from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.fluid.settings.penalties import TRACE, Penalties
 
@@ -63,18 +64,20 @@ class GapFinder:
 
     faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
     penalties: Penalties
+    periodic: tuple[int, ...] = ()  #: axes of the box
 
     def __call__(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> NarrowGaps | None:
         """The gaps between walls; None if there is none."""
         sizes, across = sizes_of(grid, walls)
         to_face = to_faces(grid, walls, self.faces)
-        gap = np.minimum(to_face, to_walls(grid, walls, WIDEST_HEIGHT * across, int(np.ceil(WIDEST_HEIGHT))))
+        layers = int(np.ceil(WIDEST_HEIGHT))
+        gap = np.minimum(to_face, to_walls(grid, walls, WIDEST_HEIGHT * across, layers, self.periodic))
         gap = np.maximum(gap, FLUSH * across)  # surfaces that touch
         near = np.flatnonzero(gap < (1.0 - FLUSH) * WIDEST_HEIGHT * across)
         if not len(near):
             return None
         near = near[np.argsort(gap[near] / across[near], kind="stable")]
-        cell = np.concatenate([walls.cell[near], *(_cells_at(grid, walls, near, gap, t) for t in ALONG[1:])])
+        cell = np.concatenate([walls.cell[near], *(self._cells_at(grid, walls, near, gap, t) for t in ALONG[1:])])
         cells, first = np.unique(cell, return_index=True)
         of = near[first % len(near)]
         count = np.bincount(walls.cell[near], minlength=grid.size)[cells]
@@ -96,13 +99,16 @@ class GapFinder:
             least,
             np.minimum(slip, MOST_SLIP),
             np.clip((WIDEST_HEIGHT - height) / (WIDEST_HEIGHT - FULL_HEIGHT), 0.0, 1.0),
-            with_solid(grid, pressure, solid),
+            with_solid(grid, pressure, solid, self.periodic),
             np.where(narrow, np.maximum(kink, 0.0), 0.0)[:, None] * np.maximum(2.0 * walls.n[of] ** 2 - 1.0, 0.0),
         )
 
-
-def _cells_at(grid: Grid, walls: Walls, some: NDArray[np.int64], gap: Array, share: float) -> NDArray[np.int64]:
-    """Cells of the box at a share of the gap in front of some walls."""
-    x = walls.x[some] - share * gap[some, None] * walls.n[some]
-    index = [np.clip(np.searchsorted(edge, x[:, axis]) - 1, 0, len(edge) - 2) for axis, edge in enumerate(grid.edges)]
-    return np.ravel_multi_index(tuple(index), grid.shape, order="F")
+    def _cells_at(
+        self, grid: Grid, walls: Walls, some: NDArray[np.int64], gap: Array, share: float
+    ) -> NDArray[np.int64]:
+        """Cells of the box at a share of the gap in front of some walls."""
+        x = Periods(grid, self.periodic).within(walls.x[some] - share * gap[some, None] * walls.n[some])
+        index = [
+            np.clip(np.searchsorted(edge, x[:, axis]) - 1, 0, len(edge) - 2) for axis, edge in enumerate(grid.edges)
+        ]
+        return np.ravel_multi_index(tuple(index), grid.shape, order="F")

@@ -19,6 +19,7 @@ from solvers import fem
 from solvers.api import Array, Indices
 from solvers.fluid.cut.cut import Cut
 from solvers.fluid.cut.extension import lagrange
+from solvers.fluid.cut.images import Periods
 from solvers.fluid.mesh.directory import Directory
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.surfaces.surface import Motion
@@ -38,15 +39,18 @@ class BehindWalls:
         self._points = nodes.points[: nodes.owned]
         self._cell = max(float(np.diff(edge).max()) for edge in grid.grid.edges)
         size = int(np.prod(unknowns.lattice_shape(degree)))
+        self._periods = Periods(grid.grid, unknowns.periodic)
         self._directory = Directory(grid.comm, nodes.numbers[: nodes.owned], unknowns.global_dofs[self._dofs], size)
 
     def bounded(self, velocity: Array, cut: Cut, wet: NDArray[np.bool_]) -> Array:
         """Velocity [m/s] at local dofs, bounded as far as the strip reaches behind wet facets (collective)."""
         result, reach = velocity.copy(), (cut.depth + 1) * self._cell
-        behind, mirror, wall = mirrored(self._points, cut.facets[wet], cut.motion, reach)
+        images = cut.images
+        some = images.facets[wet[images.facet]]
+        behind, mirror, wall = mirrored(self._points, some, images.motion(cut.motion), reach)
         outside = ~self._in_films(cut)[behind]
         behind, mirror, wall = behind[outside], mirror[outside], wall[outside]
-        found, there = self._interpolated(velocity, mirror)
+        found, there = self._interpolated(velocity, self._periods.within(mirror))
         rise, bound = velocity[self._dofs[behind]] - wall, np.linalg.norm(there - wall, axis=1)
         size = np.linalg.norm(rise, axis=1)
         large = found & (size > bound)
@@ -89,7 +93,7 @@ def with_walls(velocity: Array, unknowns: Unknowns, cut: Cut, without: NDArray[n
     if not len(some) or not len(cut.facets):
         return velocity
     cell = max(float(np.diff(edge).max()) for edge in unknowns.grid.grid.edges)
-    behind, _, wall = mirrored(nodes[some], cut.facets, cut.motion, (cut.depth + 1) * cell)
+    behind, _, wall = mirrored(nodes[some], cut.images.facets, cut.images.motion(cut.motion), (cut.depth + 1) * cell)
     result = velocity.copy()
     result[dofs[some[behind]]] = wall
     return result

@@ -78,9 +78,10 @@ def discretise(
         # incomplete factors of dense blocks are two times as fast
         blocked=methods[0] != "direct" and unknowns.block_size > 1,
     )
-    films = Films(wall_faces(patches), settings.penalties.extension) if settings.films else None
+    walls, repeated = wall_faces(patches), unknowns.periodic
+    films = Films(walls, settings.penalties.extension, repeated) if settings.films else None
     # both sides of a thin body have cells in the same place, and a gap may be on one side alone
-    gaps = GapFinder(wall_faces(patches), settings.penalties) if settings.with_gaps and sheets is None else None
+    gaps = GapFinder(walls, settings.penalties, repeated) if settings.with_gaps and sheets is None else None
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
     unions = sheets is None and len(bodies) > 1 and not in_contact
     cutter = Cutter(
@@ -92,6 +93,7 @@ def discretise(
         tied=tied(surfaces),
         closing=dry_contact(surfaces),
         steady=settings.steady,
+        periodic=unknowns.periodic,
     )
     levels = PressureLevels(system, bodies)
     moved = not settings.steady and not all(body.rests for body in bodies)

@@ -7,6 +7,7 @@ all extensive quantities are per depth.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -52,7 +53,10 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
     x = np.asarray(point, dtype=float)
     given = [body for body in fluid.bodies if body.motion is not None]
     motions = [body.motion(t) for body in given if body.motion is not None]
-    require_outside(x, [body.surface for body in given], motions)
+    surfaces, periods = [body.surface for body in given], fluid.parts.cutter.periods
+    images = [periods.images(s.facets, m.x, 0) for s, m in zip(surfaces, motions, strict=True)]
+    surfaces = [replace(s, facets=i.facets, vertices=len(i.x)) for s, i in zip(surfaces, images, strict=True)]
+    require_outside(x, surfaces, [i.motion(m) for i, m in zip(images, motions, strict=True)])
     may_be_covered = not all(body.rests for body in fluid.bodies)
 
     def shape_functions() -> tuple[np.ndarray, Array]:
@@ -65,11 +69,17 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
     def probe() -> dict[str, float]:
         dofs, weights = shape_functions() if may_be_covered and fluid.grid.sheets is not None else found()
         value = fluid.comm.allreduce(weights @ fluid.flow[dofs])
-        if may_be_covered and winding(x, fluid.cut.motion, fluid.cut.facets) > INSIDE:
+        if may_be_covered and _covered(fluid, x):
             value = np.full_like(value, np.nan)
         return _components(value) if quantity == "velocity" else {"": float(value[0])}
 
     return probe
+
+
+def _covered(fluid: Fluid, x: Array) -> bool:
+    """Whether a point [m] of the box is in a body."""
+    images = fluid.cut.images
+    return winding(x, images.motion(fluid.cut.motion), images.facets) > INSIDE
 
 
 def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:

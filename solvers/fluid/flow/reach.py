@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from solvers.api import FailureKind, NoResidual, StepFailed
 from solvers.fluid.cut.cut import Cut, Cutter
 from solvers.fluid.flow.moving_bodies import MovingBodies
-from solvers.fluid.geometry.pieces import NOTHING
 from solvers.fluid.grid.nested import FINE_LAYERS
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.space import Unknowns
@@ -106,20 +105,3 @@ def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
             "refine where it is and where it goes"
         )
         raise StepFailed("fluid", FailureKind.COARSE_CELLS, reason)
-
-
-def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
-    """Raise StepFailed if a body reaches a periodic face: it would not cut cells at the opposite face (collective)."""
-    grid = unknowns.grid
-    if grid.sheets is not None:  # which have cells with fluid of one side far from surfaces, too
-        changed = grid.sheets.parts.special[grid.numbers]
-    else:
-        changed = cut.fraction < 1.0 - NOTHING
-        changed[np.concatenate([cut.cut, cut.strip])] = True
-    indices = np.unravel_index(grid.numbers[changed], grid.grid.shape, order="F")
-    for axis in unknowns.periodic:
-        at_end = np.isin(indices[axis], [0, grid.grid.shape[axis] - 1]).any()
-        if grid.comm.allreduce(bool(at_end), op=MPI.LOR):
-            faces = f"{'xyz'[axis]}- and {'xyz'[axis]}+"
-            reason = f"a body reaches the periodic faces {faces}: take a longer box, or end earlier"
-            raise StepFailed("fluid", FailureKind.PERIODIC_FACES, reason)

@@ -119,7 +119,7 @@ def _values(fluid: Fluid, dofs: Numbers, degree: int, reference: Array) -> Array
 def open_section(fluid: Fluid, plane: CrossingPlane) -> tuple[Numbers, Array, Array]:
     """Gauss points of the part of a plane in the fluid: (local cells, reference points (n, dim), weights [m^2])."""
     low, high = cell_bounds(fluid)
-    edges = _edges(plane, fluid.cut.motion.x[fluid.cut.facets])
+    edges = _edges(plane, fluid.cut.images.x[fluid.cut.images.facets])
     parts = [_points(fluid, plane, cells, low, high, some) for cells, some in (
         (fluid.cut.uncut, edges[:0]), (fluid.cut.cut, edges),
     )]  # fmt: skip

@@ -28,6 +28,7 @@ class Pieces:
     moments: Array  #: int L_q lambda_v ds [m^(dim-1)], shape (pieces, points, dim)
     mass: Array  #: int lambda_v lambda_w ds, shape (pieces, dim, dim)
     normal: Array  #: unit normal out of the fluid, shape (pieces, dim)
+    image: NDArray[np.int64]  #: number of the facet among those of the images, see `Periods`
 
     @cached_property
     def area(self) -> Array:
@@ -68,10 +69,15 @@ def without_slivers(grid: Grid, facets: Indices, x: Array) -> Array:
     return placed
 
 
-def off_boundary(grid: Grid, corners: Array) -> NDArray[np.bool_]:
-    """Mask of the facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
+def off_boundary(grid: Grid, corners: Array, periodic: Sequence[int] = ()) -> NDArray[np.bool_]:
+    """Mask of the facets that do not lie on the boundary of the box; those that do are in dry contact with it.
+
+    Ends of `periodic` axes are no boundary.
+    """
     off = np.ones(len(corners), dtype=bool)
     for axis, edge in enumerate(grid.edges):
+        if axis in periodic:
+            continue
         near = FLUSH * float(np.diff(edge).min())
         for end in (edge[0], edge[-1]):
             off &= (np.abs(corners[:, :, axis] - end) > near).any(axis=1)
@@ -118,8 +124,10 @@ def put_where_fluid_is(
     return bounds, found
 
 
-def cells_across(grid: Grid, points: Array, moments) -> NDArray[np.int64]:
+def cells_across(grid: Grid, points: Array, moments, periodic: Sequence[int] = ()) -> NDArray[np.int64]:
     """For pieces in a face of their cell, the cell of the box on the other side of the face; -1: there is none.
+
+    Those at the ends of `periodic` axes are neighbours.
 
     moments: result of the kernel; points: of the quadrature in one direction.
     """
@@ -131,22 +139,25 @@ def cells_across(grid: Grid, points: Array, moments) -> NDArray[np.int64]:
     for axis in range(dim):
         level = np.moveaxis(by_point, dim - axis, 1).reshape(len(cell), count, count ** (dim - 1)).sum(axis=2)
         for side, step in ((0, -1), (1, 1)):
-            within = (index[axis] + step >= 0) & (index[axis] + step < grid.shape[axis])
+            beside = index[axis] + step
+            within = (beside >= 0) & (beside < grid.shape[axis]) | (axis in periodic)
             flush = level @ (points - side) ** 2 <= FLUSH**2 * area
-            across = np.where(within & flush, cell + step * int(np.prod(grid.shape[:axis])), across)
+            way = beside % grid.shape[axis] - index[axis]
+            across = np.where(within & flush, cell + way * int(np.prod(grid.shape[:axis])), across)
     return across
 
 
 def selected(pieces: Pieces, cell: NDArray[np.int64]) -> Pieces:
     """Pieces with other cells; those with a negative one are left out."""
     kept = np.flatnonzero(cell >= 0)
-    return Pieces(cell[kept], pieces.facet[kept], pieces.moments[kept], pieces.mass[kept], pieces.normal[kept])
+    others = (getattr(pieces, name)[kept] for name in ("facet", "moments", "mass", "normal", "image"))
+    return Pieces(cell[kept], *others)
 
 
 def joined_pieces(some: Sequence[Pieces]) -> Pieces:
     """All pieces, sorted by cell."""
     order = np.argsort(np.concatenate([pieces.cell for pieces in some]), kind="stable")
-    names = ("cell", "facet", "moments", "mass", "normal")
+    names = ("cell", "facet", "moments", "mass", "normal", "image")
     return Pieces(*(np.concatenate([getattr(pieces, name) for pieces in some])[order] for name in names))
 
 

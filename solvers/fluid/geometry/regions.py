@@ -100,7 +100,7 @@ def pieces_of_regions(table: CutTable, points: Array, grid: Grid, facets: Indice
     # a linear function is known from its values at the points
     mass = np.swapaxes(moments, 1, 2) @ _at_points(table, points, grid, x[facets[facet]], table.piece_region[some])
     normal = -unit_normals(x[facets])
-    surface = Pieces(row[some], facet, moments, 0.5 * (mass + np.swapaxes(mass, 1, 2)), normal[facet])
+    surface = Pieces(row[some], facet, moments, 0.5 * (mass + np.swapaxes(mass, 1, 2)), normal[facet], facet)
     exact = np.flatnonzero((rows >= 0) & table.exact[table.cell])
     if not len(exact):
         return surface
@@ -117,9 +117,8 @@ def pieces_of_regions(table: CutTable, points: Array, grid: Grid, facets: Indice
     moments = (sign[:, None] * along)[:, :, None] * at
     mass = np.swapaxes(moments, 1, 2) @ at
     normals = sign[:, None] * np.eye(grid.dim)[axis]
-    return joined_pieces(
-        [surface, Pieces(rows[region], beside, moments, 0.5 * (mass + np.swapaxes(mass, 1, 2)), normals)]
-    )
+    mass = 0.5 * (mass + np.swapaxes(mass, 1, 2))
+    return joined_pieces([surface, Pieces(rows[region], beside, moments, mass, normals, beside)])
 
 
 def _ends(table: CutTable, points: Array, grid: Grid, normal: Array, some: Indices) -> Array:

@@ -72,12 +72,12 @@ class InterfaceTerms:
         #: mean, for the derivatives by the motion of surfaces
         self.mu = mu if isinstance(mu, float) else float(mu.mean()) if len(mu) else 0.0
         self.dim, self._unknowns, self.vertices = grid.dim, unknowns, len(cut.motion.x)
-        self.comm = grid.comm
+        self.comm, self.periodic = grid.comm, unknowns.periodic
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
         self.full_penalty = self.penalty  #: P, where `penalty` becomes P R
         self.cell, self.facet, self.corners = cells, facet, cut.facets[facet]
-        self.x = cut.motion.x[self.corners]
+        self.x = cut.images.x[cut.images.facets[pieces.image[mine]]]
         self.sizes = grid.sizes[cells]
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table

@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 
 from solvers import kernels
 from solvers.algebra.connected import connected_parts
-from solvers.api import Array, Indices, Mask
+from solvers.api import Array, FailureKind, Indices, Mask, StepFailed
 from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.pieces import off_boundary, without_slivers
 from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
@@ -286,6 +286,7 @@ def find_sheets(
             may_close and close_a_way(grid, moments, cells, links)
         ):
             return None
+    _require_off_ends(grid, special, repeated)
     copies = node_copies(grid, cells, parts.share, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)
     linked = np.zeros(len(cells), dtype=bool)
@@ -378,6 +379,19 @@ def _neighbours(grid: Grid, cells: Indices) -> set[tuple[int, int]]:
         stride = int(np.prod(grid.shape[:axis]))
         found |= {(c, c + stride) for c, i in zip(cells.tolist(), index[:, axis], strict=True) if i + 1 < count}
     return {pair for pair in found if pair[1] in members}
+
+
+def _require_off_ends(grid: Grid, special: Mask, repeated: tuple[int, ...]) -> None:
+    """Raise StepFailed if a thin body reaches a periodic face: cells of its sides are not joined across it."""
+    box = grid.as_box(special)
+    for axis in repeated:
+        if np.take(box, [0, -1], axis=axis).any():
+            name = "xyz"[axis]
+            reason = (
+                f"a thin body, or another one beside thin bodies, reaches the periodic faces {name}- and {name}+: "
+                "take a longer box, or end earlier"
+            )
+            raise StepFailed("fluid", FailureKind.PERIODIC_FACES, reason)
 
 
 def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody], repeated: tuple[int, ...] = ()) -> Sheets | None:

@@ -105,7 +105,11 @@ def covered_faces(
         middles = fem.facet_midpoints(grid.domain, facets)
         for face in FACES[: 2 * grid.dim]:
             on = grid.on_face(middles, face)
-            found = known.of(grid.grid, face, points, cut.facets, cut.motion) if on.any() else None
+            found = (
+                known.of(grid.grid, face, points, cut.images.facets, cut.images.motion(cut.motion))
+                if on.any()
+                else None
+            )
             if found is not None and len(found.cells):
                 part, touched = _covered(grid, unknowns, found, face, points, cells[on])
                 free[np.flatnonzero(on)[touched]] = False

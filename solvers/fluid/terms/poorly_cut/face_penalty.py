@@ -15,7 +15,8 @@ from solvers.fluid.settings.penalties import Penalties
 from solvers.fluid.terms import forms
 from solvers.fluid.terms.gap_terms import GapTerms
 from solvers.fluid.terms.matrix import Pattern
-from solvers.fluid.terms.poorly_cut.ghost import Scales
+from solvers.fluid.terms.poorly_cut.ghost import FaceFlow, Scales
+from solvers.fluid.terms.poorly_cut.seam_penalty import CellScales, SeamPenalty
 
 
 class FacePenalty:
@@ -23,9 +24,19 @@ class FacePenalty:
 
     by_faces = True
 
-    def __init__(self, unknowns: Unknowns, flow: forms.Coefficients, penalties: Penalties, gaps: GapTerms):
-        """gaps: those of the present cut when it is set."""
+    def __init__(
+        self,
+        unknowns: Unknowns,
+        of_faces: FaceFlow,
+        penalties: Penalties,
+        gaps: GapTerms,
+        seams: SeamPenalty | None = None,
+    ):
+        """gaps: those of the present cut when it is set; seams: across the ends of periods; None: there are none."""
         self.unknowns, self._grid, self._gaps = unknowns, unknowns.grid, gaps
+        self._of_faces, self._seams = of_faces, seams
+        self._scales: Scales | None = None
+        flow = of_faces.coefficients
         domain = self._grid.domain
         self.outside = np.zeros(unknowns.owned, dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
@@ -56,24 +67,30 @@ class FacePenalty:
         convective = scales.cell_speed * h
         phi = scales.viscosity / scales.density + convective + scales.alpha * h**2
         self._phi.x.array[:], self._convective.x.array[:] = phi, convective**2 / phi
-        self.stale = True
+        self._scales, self.stale = scales, True
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
         marked = self._gaps.marked
         self.stale |= not np.array_equal(self._faces, cut.ghost_faces) or marked is not self._marked
         self._faces, self._marked = cut.ghost_faces, marked
+        if self._seams is not None:
+            self.stale |= self._seams.set_cut(cut)
         return False
 
     def extra_entries(self) -> NDArray[np.int64] | None:
-        return None
+        return None if self._seams is None else self._seams.entries()
 
     def fill(self, matrix: PETSc.Mat, pattern: Pattern) -> None:
         faces = self._grid.find_interior_faces()[0][pattern.faces]
         fem.assemble_matrix(matrix, self._form.on(interior_facet=faces))
+        if self._seams is not None:
+            self._seams.fill(matrix)
 
     def assemble(self, matrix: PETSc.Mat, history: Array) -> None:
         self.stale = False
         history[:] = 0.0
+        if self._seams is not None and self._scales is not None:
+            self._seams.assemble(matrix, self._scales, self._cell_scales(), history)
         if not len(self._faces):
             return
         fem.assemble_matrix(matrix, self._form.on(interior_facet=self._faces))
@@ -83,6 +100,11 @@ class FacePenalty:
             faces, sides = self._grid.find_interior_faces()
             beside = np.isin(self._faces, faces[self._gaps.narrow[sides].any(axis=1)])
             fem.assemble_matrix(matrix, self._in_gaps.on(interior_facet=self._faces[beside]))
+
+    def _cell_scales(self) -> CellScales:
+        phi, convective, has_history = (f.x.array for f in (self._phi, self._convective, self._has_history))
+        pressure, kink = self._gaps.of_faces()
+        return CellScales(self._of_faces.viscosity(), phi, convective, has_history, pressure, kink)
 
     def settle(self, values: Array) -> Array:
         return values

@@ -115,6 +115,7 @@ def _ends_at_walls(
     the boundary or leave it as a whole, and does not count.
     """
     sides = np.stack([index == 0, index == np.array(grid.grid.shape) - 1], axis=2)
+    sides[:, list(at.periodic)] = False  # ends of periods are planes of the grid like others
     sides &= (np.ptp(at.x, axis=1) > EXTENT_THAT_HOLDS * moved)[:, :, None]
     some = np.flatnonzero(sides.any(axis=(1, 2)))
     origin, x, sizes = origin[some], at.x[some], at.sizes[some]
