@@ -13,45 +13,45 @@ RIGID = "  bodies: {post: {mesh: {shape: disc, radius: 0.1, cells: [8, 1], trans
 
 #: what is replaced, by what, the message with line and column, the text that stands there
 MISTAKES = [
-    (COUPLING, "coupling: {sceme: monolithic}", "18:12: unknown setting 'sceme'; did you mean 'scheme'?", "sceme"),
-    (COUPLING, "coupling: {scheme: both}", "18:20: 'scheme' must be 'monolithic' or 'partitioned', not 'both'", "both"),
-    (COUPLING, "coupling: {reuse: 3}", "18:19: 'reuse' applies only to the partitioned scheme", "3"),
+    (COUPLING, "coupling: {sceme: monolithic}", "19:12: unknown setting 'sceme'; did you mean 'scheme'?", "sceme"),
+    (COUPLING, "coupling: {scheme: both}", "19:20: 'scheme' must be 'monolithic' or 'partitioned', not 'both'", "both"),
+    (COUPLING, "coupling: {reuse: 3}", "19:19: 'reuse' applies only to the partitioned scheme", "3"),
     (
         COUPLING,
         "coupling: {scheme: partitioned, relaxation: 0}",
-        "18:45: 'relaxation' must be greater than 0, not 0",
+        "19:45: 'relaxation' must be greater than 0, not 0",
         "0}",
     ),
     (
         COUPLING,
         "coupling: {scheme: partitioned, accelerator: iqn-ils}",
-        "18:46: 'accelerator' must be 'iqn', 'aitken' or 'constant', not 'iqn-ils'",
+        "19:46: 'accelerator' must be 'iqn', 'aitken' or 'constant', not 'iqn-ils'",
         "iqn-ils",
     ),
     (
         COUPLING,
         "coupling: {scheme: partitioned, max_iterations: 0}",
-        "18:49: 'max_iterations' must be at least 1, not 0",
+        "19:49: 'max_iterations' must be at least 1, not 0",
         "0}",
     ),
     (
         COUPLING,
         "coupling: {wetted: {pots: top}}",
-        "18:27: unknown body 'pots'; did you mean 'post'?",
+        "19:27: unknown body 'pots'; did you mean 'post'?",
         "top",
     ),
     (
         COUPLING,
         "coupling: {wetted: {post: [top, lfet]}}",
-        "18:33: 'rectangle' has no surface 'lfet'; did you mean 'left'? (available: left, right, bottom, top)",
+        "19:33: 'rectangle' has no surface 'lfet'; did you mean 'left'? (available: left, right, bottom, top)",
         "lfet",
     ),
-    (STRUCTURE, "", "11:11: 'coupling' needs the section 'structure'", "{scheme"),
+    (STRUCTURE, "", "12:11: 'coupling' needs the section 'structure'", "{scheme"),
     (FLUID, "", "10:11: 'coupling' needs the section 'fluid'", "{scheme"),
     (
         "structure:",
         RIGID,
-        "11:18: 'post' is already the name of an elastic body; give this rigid body another one",
+        "12:18: 'post' is already the name of an elastic body; give this rigid body another one",
         "{mesh",
     ),
     (
@@ -69,10 +69,10 @@ MISTAKES = [
     (
         "{quantity: force}",
         "{quantity: force, body: pots}",
-        "21:34: unknown body 'pots'; did you mean 'post'?",
+        "22:34: unknown body 'pots'; did you mean 'post'?",
         "pots",
     ),
-    ("value: tip.x", "value: interface.wrok", "24:13: there is no value 'interface.wrok'; did you mean", "interface"),
+    ("value: tip.x", "value: interface.wrok", "25:13: there is no value 'interface.wrok'; did you mean", "interface"),
 ]
 
 
