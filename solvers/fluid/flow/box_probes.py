@@ -153,7 +153,8 @@ def _cut_again(fluid: Fluid, ends: Array, middle: Array) -> Array:
     numbers = np.ravel_multi_index(index, grid.shape, order="F")
     wanted = np.zeros(grid.size, dtype=bool)
     wanted[numbers] = True
-    cutter, facets, x = fluid.parts.cutter, fluid.cut.facets, fluid.cut.motion.x
+    cutter, images = fluid.parts.cutter, fluid.cut.images
+    facets, x = images.facets, images.x
     placed = without_slivers(grid, facets, x) if cutter.unions else in_planes(grid, x)
     moments = kernels.moments(grid.edges, points, placed, facets, wanted)
     if cutter.unions:

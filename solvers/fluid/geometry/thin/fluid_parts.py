@@ -130,7 +130,8 @@ class FluidParts:
 def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> FluidParts:
     """Parts of the fluid around surfaces with vertices at x [m].
 
-    moments: of `kernels.moments`; cells that these count as solid, without surface, have no parts.
+    moments: of `kernels.moments`; cells that these count as solid but for rounding have no parts, unless surfaces touch
+    there.
     Where one body overlaps itself its regions are not known, and all fluid of the cell is one part.
     """
     geometry = Geometry(grid, surfaces, x)
@@ -138,11 +139,11 @@ def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> F
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True
     several = with_several_bodies(grid, moments, geometry.surfaces.body)
-    touching = np.flatnonzero(touching_cells(grid, moments, table, several, surfaces.facets, x))
+    meeting = touching_cells(grid, moments, table, several, surfaces.facets, x)
     total = np.bincount(table.cell, table.share, grid.size)
     with_surface = np.zeros(grid.size, dtype=bool)
     with_surface[moments.cells[moments.piece_cell]] = True
-    filled = ~with_surface & (fluid <= NOTHING)
+    filled = (fluid <= NOTHING) & ~(with_surface & meeting)  # as in the cut, which has no fluid in them either
     closed = np.bincount(table.closed_cell, table.closed_moments.sum(axis=(1, 2)), grid.size)
     rounding = SAME_VOLUME + closing_length(grid) * closed / grid.cell_sizes().prod(axis=1)
     unknown = ~several & (np.abs(total - fluid) > rounding) & (table.state != CellState.FLUID)
@@ -167,7 +168,7 @@ def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> F
     pieces = np.concatenate([pieces, np.stack([rest, moments.piece_facet[in_unknown]], axis=1)])
     pieces = np.unique(pieces[pieces[:, 0] >= 0], axis=0)
     links = _links(grid, table, part, part_of_cell)
-    return FluidParts(geometry, cell, share, region, links, special, touching, pieces)
+    return FluidParts(geometry, cell, share, region, links, special, np.flatnonzero(meeting), pieces)
 
 
 def _towards(table: CutTable, geometry: Geometry) -> Array:
