@@ -326,9 +326,8 @@ class Cutter:
 
     def _facing(self, moments, counts, normal) -> NDArray[np.bool_]:
         """Box cells with surfaces that face each other, in them or in their faces: fluid enters if they separate."""
-        number, across, size = (
-            moments.cells[moments.piece_cell], cells_across(self.grid.grid, self.points, moments, self.periods.axes), self.grid.grid.size
-        )  # fmt: skip
+        number, size = moments.cells[moments.piece_cell], self.grid.grid.size
+        across = cells_across(self.grid.grid, self.points, moments, self.periods.axes)
         area = moments.piece_mass.sum(axis=(1, 2)) * counts[moments.piece_facet]
         in_face = across >= 0
         number = np.concatenate([number, across[in_face]])
