@@ -35,7 +35,8 @@ def measure(fluid: Fluid) -> list[BodyCells]:
         return []
     cut, starts = fluid.cut, np.cumsum([len(body.surface.facets) for body in fluid.bodies])[:-1]
     corners = np.split(cut.motion.x[cut.facets], starts)
-    bodies = [(body.surface.name, part) for body, part in zip(fluid.bodies, corners, strict=True)]
+    homes = [_home(fluid, motion.x) for motion in fluid.moving.motions]
+    bodies = [(body.surface.name, part + way) for body, part, way in zip(fluid.bodies, corners, homes, strict=True)]
     walls = walls_of_box((patch.faces, patch.record) for patch in fluid.patches)
     force, wet = fluid.system.force_on_facets()
     scene = scene_of(fluid.grid.grid, walls, bodies, wet > 0.0)
@@ -62,6 +63,11 @@ def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Ar
     return replace(found, layer=fluid.settings.viscosity * speed * across / drag)
 
 
+def _home(fluid: Fluid, x: Array) -> Array:
+    """The way [m] into the box for a body that went through periods, by its middle."""
+    return fluid.parts.cutter.periods.home(x)
+
+
 def _median(values: Array, weights: Array) -> float:
     """The value with half of the weight below it."""
     order = np.argsort(values)
@@ -72,7 +78,7 @@ def _median(values: Array, weights: Array) -> float:
 def _speed(fluid: Fluid, body: int) -> float:
     """Largest velocity relative to a body within half of its extent around it [m/s] (collective)."""
     motion, nodes = fluid.moving.motions[body], fluid.unknowns.velocity
-    low, high = motion.x.min(axis=0), motion.x.max(axis=0)
+    low, high = (end + _home(fluid, motion.x) for end in (motion.x.min(axis=0), motion.x.max(axis=0)))
     margin = 0.5 * (high - low).max()
     x = nodes.points[: nodes.owned, : fluid.dim]
     near = ((x > low - margin) & (x < high + margin)).all(axis=1)
