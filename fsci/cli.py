@@ -285,7 +285,7 @@ def _demo(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from fsci.case import CaseError, load_case
     from fsci.check.check import summary
-    from fsci.check.cost import in_words
+    from fsci.check.cost import in_words, memory_of_machine, too_much_memory
     from fsci.check.meshes import check_meshes
 
     try:
@@ -298,7 +298,8 @@ def _check(options: argparse.Namespace) -> int:
     print(f"{case.path}\n{summary(case, found.meshes, found.pairs, found.walls)}")
     if cost := in_words(case, found.meshes):
         print(f"  estimate: {cost}")
-    for kind, lines in (("note", found.notes), ("warning", [*case.warnings, *found.warnings])):
+    warnings = [*case.warnings, *found.warnings, *too_much_memory(case, found.meshes, memory_of_machine())]
+    for kind, lines in (("note", found.notes), ("warning", warnings)):
         for line in lines:
             print(f"{kind}: {line}", file=sys.stderr)
     print("ok")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,10 +63,33 @@ def estimate(case: Case, structure: int | None, table: Table, dimension: int | N
 
 def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
     """One line on the cost of a case; empty if its size is unknown."""
+    cost = _cost(case, meshes)
+    return "" if cost is None else describe_cost(cost, case.time.steps)
+
+
+def _cost(case: Case, meshes: Mapping[str, Mesh]) -> Cost | None:
     structure = None if case.structure is None else structure_dofs(case.structure, meshes)
     dimension = next((mesh.points.shape[1] for mesh in meshes.values()), None)
-    cost = estimate(case, structure, costs(), dimension)
-    return "" if cost is None else describe_cost(cost, case.time.steps)
+    return estimate(case, structure, costs(), dimension)
+
+
+def too_much_memory(case: Case, meshes: Mapping[str, Mesh], machine: float) -> list[str]:
+    """A warning if the run needs more memory than the machine has [MB]; with what the other element would need."""
+    if (cost := _cost(case, meshes)) is None or cost.memory <= machine:
+        return []
+    advice = "take fewer cells"
+    if case.fluid is not None and flow_element(case).element == "q2q1":
+        fluid = case.fluid.model_copy(update={"element": "q1q1"})
+        if (other := _cost(case.model_copy(update={"fluid": fluid}), meshes)) is not None:
+            advice += f", or 'element: q1q1', which needs about {_memory_words(other.memory)}"
+    return [
+        f"the run needs about {_memory_words(cost.memory)}, and this machine has {_memory_words(machine)}: {advice}"
+    ]
+
+
+def memory_of_machine() -> float:
+    """[MB]."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e6
 
 
 def costs() -> Table:
@@ -123,7 +147,9 @@ def _time(seconds: float) -> str:
 
 
 def _memory_words(megabytes: float) -> str:
-    return f"{megabytes / 1000:.2g} GB" if megabytes >= 995 else f"{round(megabytes, -1):.0f} MB"
+    if megabytes < 995:
+        return f"{round(megabytes, -1):.0f} MB"
+    return f"{megabytes / 1000:.2g} GB" if megabytes < 9950 else f"{megabytes / 1000:,.0f} GB"
 
 
 #: One process of a cloud machine, November 2026 (`fsci bench cost`)

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 
 import pytest
 from coupled_case import POST as CHANNEL_AND_POST
@@ -11,7 +12,7 @@ from small_scenes import BLOCK
 
 from fsci.case import load_case
 from fsci.check import cost
-from fsci.check.cost import MEASURED, Cost, describe_cost, estimate
+from fsci.check.cost import MEASURED, Cost, describe_cost, estimate, too_much_memory
 
 #: kind -> two sizes; every factor ten in unknowns takes ten times as long, and contact twice, coupling three times
 TABLE = {
@@ -52,6 +53,20 @@ def test_words():
     )
     assert "12 s per step, 33 h for all, 2.4 GB" in describe_cost(Cost(1, 12.0, 2400.0), 10_000)
     assert "0.5 s per step, 4 min for all" in describe_cost(Cost(1, 0.5, 100.0), 500)
+
+
+def test_more_memory_than_the_machine_has(tmp_path):
+    """With what the other element needs."""
+    box = "{from: [0, 0, 0], to: [3, 1, 1], cells: [144, 48, 48]}"
+    faces = "{walls: {on: [x-, x+, y-, y+, z-, z+], no_slip: true}}"
+    fluid = f"fluid: {{density: 1, viscosity: 1, grid: {box}, patches: {faces}}}"
+    case = case_of(tmp_path, f"title: Box\ntime: {{step: 1, end: 1}}\n{fluid}\n")
+    (told,) = too_much_memory(case, {}, 24_000.0)
+    words = (
+        r"the run needs about \d{3} GB, and this machine has 24 GB: take fewer cells, or 'element: q1q1', which needs"
+    )
+    assert re.match(words, told)
+    assert too_much_memory(case, {}, 1e6) == []
 
 
 def test_check_says_it(tmp_path):
