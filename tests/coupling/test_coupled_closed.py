@@ -54,7 +54,7 @@ def message(text: str, folder) -> str:
 
 def test_walls_all_round_a_steady_flow(tmp_path):
     said = message(COLUMN.replace(OPEN, CLOSED), tmp_path)
-    assert "case.yaml:6:11: the boundary encloses the fluid, and a steady flow does not determine its pressure" in said
+    assert "case.yaml:7:11: the boundary encloses the fluid, and a steady flow does not determine its pressure" in said
     assert "take 'bdf2', or give a patch with 'traction', 'pressure', 'outflow', 'resistance' or 'windkessel'" in said
 
 
@@ -74,7 +74,7 @@ def test_a_steady_flow_is_not_repeated_with_half_its_step(scheme, tmp_path, monk
 def test_relaxation_alone(tmp_path):
     said = message(RING.replace("monolithic", "partitioned, accelerator: aitken"), tmp_path)
     expected = "bodies enclose a part of the fluid, and relaxation alone does not find its pressure: take 'iqn'"
-    assert f"case.yaml:18:46: {expected}" in said
+    assert f"case.yaml:19:46: {expected}" in said
 
 
 def test_a_cavity_in_a_body(tmp_path):

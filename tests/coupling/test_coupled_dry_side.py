@@ -118,20 +118,20 @@ def test_membrane_under_pressure(tmp_path):
 
 
 MISTAKES = [
-    ("dry_side: {block:", "dry_side: {blok:", "21:20: unknown body 'blok'; did you mean 'block'?"),
-    ("  wetted: {block: top}\n", "", "20:21: say which surface is wet: 'wetted: {block: [..]}'"),
-    ("[[0, 0], [1, 0]]", "[]", "21:21: 'block' must have 1 or more entries, not 0"),
-    ("[1, 0]]", "[1, 0, 0]]", "21:30: a corner has 2 entries in 2D, not 3"),
-    ("wetted: {block: top}", "wetted: {block: [top, bottom]}", "21:21: the wetted surface must be one line with two"),
+    ("dry_side: {block:", "dry_side: {blok:", "22:20: unknown body 'blok'; did you mean 'block'?"),
+    ("  wetted: {block: top}\n", "", "21:21: say which surface is wet: 'wetted: {block: [..]}'"),
+    ("[[0, 0], [1, 0]]", "[]", "22:21: 'block' must have 1 or more entries, not 0"),
+    ("[1, 0]]", "[1, 0, 0]]", "22:30: a corner has 2 entries in 2D, not 3"),
+    ("wetted: {block: top}", "wetted: {block: [top, bottom]}", "22:21: the wetted surface must be one line with two"),
     (
         "[[0, 0], [1, 0]]",
         "[[0, 0.1], [1, 0.1]]",
-        "21:21: the line from (0, 0.1) to (1, 0.1) crosses the box: add corners that lead around it",
+        "22:21: the line from (0, 0.1) to (1, 0.1) crosses the box: add corners that lead around it",
     ),
     (
         "[[0, 0], [1, 0]]",
         "[[0, 2], [1, 2]]",
-        "21:21: the body must lie between its wetted surface and these points",
+        "22:21: the body must lie between its wetted surface and these points",
     ),
 ]
 
@@ -231,7 +231,7 @@ def test_what_is_not_closed(old, new, message, tmp_path, monkeypatch):
     text = balloon(FLAT)
     assert old in text
     error = refused(text.replace(old, new), lambda case: run_case(case, tmp_path / "out"))
-    assert any(line == f"case.yaml:17:20: {message}" for line in first_lines(error)), first_lines(error)
+    assert any(line == f"case.yaml:18:20: {message}" for line in first_lines(error)), first_lines(error)
 
 
 def test_3d_has_no_dry_side(tmp_path):

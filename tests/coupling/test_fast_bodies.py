@@ -58,7 +58,7 @@ def test_a_rotation(tmp_path):
     assert case.warnings == ()  # the mesh is not read yet
     (warning,) = fast(case)
     assert (
-        "case.yaml:13:15: the body crosses 3 cells in a time step: forces are inaccurate; a 'step' below 0.067"
+        "case.yaml:14:15: the body crosses 3 cells in a time step: forces are inaccurate; a 'step' below 0.067"
         in warning
     )
     slow = load_case(tmp_path / "case.yaml", [("time.step", "0.06")])

@@ -113,4 +113,4 @@ def test_a_body_as_long_as_the_period(tmp_path):
     with pytest.raises(CaseError) as caught:
         build(load_case(path), MPI.COMM_SELF, Timer())
     rule = "the body must be shorter than the period along x, 2: it has 2"
-    assert str(caught.value).startswith(f"{path}:9:11: {rule}")
+    assert str(caught.value).startswith(f"{path}:10:11: {rule}")

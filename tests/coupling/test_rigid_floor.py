@@ -123,5 +123,5 @@ def test_a_column_that_is_not_there(tmp_path):
     (tmp_path / "case.yaml").write_text(FALLING.replace("contact.on_disc.y", "contact.on_disk.y"))
     with pytest.raises(CaseError) as error:
         load_case(tmp_path / "case.yaml")
-    assert "case.yaml:16:18" in str(error.value)
+    assert "case.yaml:17:18" in str(error.value)
     assert "there is no value 'contact.on_disk.y'; did you mean 'contact.on_disc.y'?" in str(error.value)

@@ -73,6 +73,24 @@ def test_water_in_a_rigid_ring_that_spins_is_kept():
     assert numbers["fluid.pocket_2"] == pytest.approx(4 - np.pi * 0.75**2, rel=1e-12)
 
 
+def test_strips_that_meet_within_a_wall_do_not_join_pockets():
+    """Values of second degree are extended into strips: fluid in a ring that moves with the flow has its own level."""
+
+    def carried(points, t):
+        return points + np.array([0.7 * t, 0.0]), np.tile([0.7, 0.0], (len(points), 1))
+
+    box = uniform([-0.8, -0.5], [0.8, 0.5], [64, 40])
+    ends, walls = Patch("ends", ("x-", "x+"), "periodic"), Patch("walls", ("y-", "y+"), "slip")
+    moved = ring(0.16, 0.42, carried, (-0.2, 0.02))
+    fluid = make_fluid(box, [ends, walls], [moved], element="q2q1", mu=0.05, dt=0.03, initial_velocity=field(0.7, 0.0))
+    step(fluid, 0.0, 0.03)
+    assert not fluid.iterate._levels.unknown
+    assert len(fluid.iterate._levels._holds) == 2
+    nodes = fluid.unknowns.velocity.dofs
+    velocity = fluid.flow[nodes][fluid.system.active_dofs[nodes[:, 0]]]
+    assert np.abs(velocity - [0.7, 0.0]).max() < 1e-10
+
+
 def test_a_ring_that_is_squeezed_by_its_data_is_found():
     def squeezed(points, t):
         return points * (1 - 0.05 * t), -0.05 * points

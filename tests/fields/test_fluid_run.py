@@ -227,16 +227,16 @@ def test_two_processes(moving, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("at: [1, 0.65]", "at: [1, 0.5]", "21:35: there is no fluid at (1.0, 0.5): the point is in body 'paddle'"),
+        ("at: [1, 0.65]", "at: [1, 0.5]", "22:35: there is no fluid at (1.0, 0.5): the point is in body 'paddle'"),
         (
             "{on: [x-, x+, y-, y+], no_slip: true}",
             "{on: [x-, x+, y-, y+], where: x - 1, no_slip: true}",
-            "7:3: no patch is on part of the box's boundary: x-, y-, y+",
+            "8:3: no patch is on part of the box's boundary: x-, y-, y+",
         ),
         (
             "cells: [10, 2]}",
             "cells: [10, 2]}\n      on: [left, right]",
-            "12:11: these surfaces do not enclose the body: name all of them",
+            "13:11: these surfaces do not enclose the body: name all of them",
         ),
     ],
 )

@@ -82,7 +82,7 @@ def test_a_body_with_another_gravity_than_the_flow(tmp_path, gravity, warned):
     assert bool(found) == warned
     if warned:
         (line,) = found
-        assert "case.yaml:12:" in line
+        assert "case.yaml:13:" in line
         assert "the gravity of the body is not that of the flow: weight and buoyancy differ" in line
 
 

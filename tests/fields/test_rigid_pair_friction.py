@@ -136,7 +136,7 @@ def test_a_free_body_has_not_the_name_of_a_wall(tmp_path):
         load_case(written(tmp_path, text))
     (problem,) = error.value.problems
     assert problem.message == SHARED
-    assert (problem.place.line, problem.place.column) == (10, 12)
+    assert (problem.place.line, problem.place.column) == (11, 12)
     load_case(written(tmp_path, WALLS.replace("    two: {", "    top: {").replace("body: two", "body: top")))
     contact = WALLS[WALLS.index("contact: ") : WALLS.index("probes: ")]
     off = WALLS.replace("    two: {", "    floor: {").replace("body: two", "body: floor")

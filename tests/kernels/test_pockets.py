@@ -49,13 +49,13 @@ def check(comm):
             is_open &= active
             here = active[tuple(index.T)]
             cut = SimpleNamespace(
-                active=np.flatnonzero(here).astype(np.int32),
                 facets=np.empty((0, 2), dtype=np.int64),
                 pieces=SimpleNamespace(facet=np.empty(0, dtype=np.int64), cell=np.empty(0, dtype=np.int64)),
                 cut=np.empty(0, dtype=np.int32),
             )
             opening = np.flatnonzero(is_open[tuple(index.T)]).astype(np.int32)
-            found = find_pockets(grid, cut, opening, np.empty(0, dtype=bool), periodic)
+            cells = np.flatnonzero(here).astype(np.int32)
+            found = find_pockets(grid, cut, cells, opening, np.empty(0, dtype=bool), periodic)
             owned = [index[: grid.owned][pocket.cells[: grid.owned]].tolist() for pocket in found]
             gathered = [set(map(tuple, itertools.chain(*parts))) for parts in zip(*comm.allgather(owned), strict=True)]
             closed = [part for part in flood(active, periodic) if not any(is_open[cell] for cell in part)]

@@ -26,14 +26,20 @@ class Pocket:
 
 
 def find_pockets(
-    grid: DistributedGrid, cut: Cut, is_open: NDArray[np.int32], elastic: Mask, periodic: Sequence[int] = ()
+    grid: DistributedGrid,
+    cut: Cut,
+    coupled: NDArray[np.int32],
+    is_open: NDArray[np.int32],
+    elastic: Mask,
+    periodic: Sequence[int] = (),
 ) -> list[Pocket]:
     """All pockets, the same list on every process (collective).
 
-    is_open: local cells at an open boundary; elastic: mask of vertices that another field moves. Cells that share a
-    vertex are connected, because they share unknowns, also across `periodic` axes.
+    coupled: sorted local cells with fluid, or through which the cut penalty couples others; is_open: those at an open
+    boundary; elastic: mask of vertices that another field moves. Cells that share a vertex are connected, because they
+    share unknowns, also across `periodic` axes.
     """
-    own = cut.active[cut.active < grid.owned]
+    own = coupled[coupled < grid.owned]
     labels, count = regions(grid, own, periodic)
     at_elastic = elastic[cut.facets[cut.pieces.facet]].any(axis=1)
     marks = np.zeros((3, count + 1), dtype=np.int64)  # open cells, elastic pieces, cells of each part

@@ -138,7 +138,8 @@ class FlowIterate:
 
     def multigrid(self, matrix: PETSc.Mat, product: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent, which it multiplies by `product`; the next call overwrites it."""
-        return self.solver.create_multigrid().preconditioner(matrix, self.held, self._system, product)
+        levels = self.free_levels()
+        return self.solver.create_multigrid().preconditioner(matrix, self.held, self._system, product, levels)
 
     def product(self, matrix: PETSc.Mat, reduction: float) -> PETSc.Mat:
         """The tangent as it multiplies vectors in a Krylov method; the next call overwrites it.

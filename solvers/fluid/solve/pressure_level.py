@@ -111,7 +111,20 @@ def closed_pockets(system: FlowSystem, elastic: Mask) -> list[Pocket]:
     assert system.cut is not None
     if not closed and not _in_fluid(system.grid, system.cut):
         return []
-    return find_pockets(system.grid, system.cut, system.boundary.open_cells(), elastic, system.unknowns.periodic)
+    return find_pockets(
+        system.grid, system.cut, _coupled(system, system.cut), system.boundary.open_cells(), elastic,
+        system.unknowns.periodic,
+    )  # fmt: skip
+
+
+def _coupled(system: FlowSystem, cut: Cut) -> NDArray[np.int32]:
+    """Local cells that couple pressures: of the strips behind surfaces only where a ghost penalty acts on their faces.
+
+    Values that are extended into strips couple nothing, also where the strips of two fluids meet within a wall.
+    """
+    if system.cut_penalty is None or system.cut_penalty.by_faces:
+        return cut.active
+    return np.sort(np.concatenate([cut.uncut, cut.cut]))
 
 
 def _in_fluid(grid: DistributedGrid, cut: Cut) -> bool:

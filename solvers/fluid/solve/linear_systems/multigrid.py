@@ -26,6 +26,7 @@ from solvers.fluid.solve.linear_systems.decoupled import decoupled
 from solvers.fluid.solve.linear_systems.level_copies import from_second_degree, second_degree, vertices
 from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
 from solvers.fluid.solve.linear_systems.near_smoother import NearSmoother
+from solvers.fluid.solve.linear_systems.pinned_levels import pinned
 
 #: What is added to the diagonal of unknowns behind surfaces for the smoother, relative to the sum of |entries| of the
 #: row. Without it incomplete factors of three layers in stretched cells amplify by 1e16. From 0.01 to 0.2 a ball that
@@ -199,13 +200,18 @@ class Multigrid:
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
     def preconditioner(
-        self, matrix: PETSc.Mat, held: NDArray[np.bool_], surfaces: Surfaces, product: PETSc.Mat | None = None
+        self,
+        matrix: PETSc.Mat,
+        held: NDArray[np.bool_],
+        surfaces: Surfaces,
+        product: PETSc.Mat | None = None,
+        levels: Array | None = None,
     ) -> PETSc.PC:
         """One cycle for a matrix; it does not follow later changes (collective).
 
         With first degree the next call overwrites it if the pattern of the matrix is the same: subdomains and patterns
         of factors are found once. held: owned unknowns with rows of the identity; product: the matrix that
-        multiplies vectors, None: `matrix`.
+        multiplies vectors, None: `matrix`; levels: pressure levels that bodies determine, see `pinned`.
         """
         matrices, interpolations = self._galerkin(matrix, held)
         finest = product or matrix
@@ -222,7 +228,7 @@ class Multigrid:
             smoother = cycle.getMGSmoother(level)
             if level == 0:
                 smoother.reset()  # the pivots of LU factors may depend on those before
-                smoother.setOperators(of)
+                smoother.setOperators(of if levels is None else pinned(of, levels, interpolations))
             else:
                 smoother.getPC().setReusePreconditioner(False)
                 if self._second:
