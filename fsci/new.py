@@ -79,12 +79,12 @@ time: {{step: 0.05, end: 3}}
 fluid:
   density: 1
   viscosity: 1e-3
-  # The grid is a box; the cylinder cuts its cells. Here they are 1 cm, but 4 mm around the cylinder.
+  # The grid is a box; the cylinder cuts its cells. Here they are 2.5 cm, but 1 cm around the cylinder.
   grid:
     from: [0, 0]
     to: [2.2, 0.41]
-    x: [{{to: 0.1, cells: 10}}, {{to: 0.3, cells: 50}}, {{to: 2.2, cells: 80, ratio: 8}}]
-    y: [{{to: 0.1, cells: 15, ratio: 0.4}}, {{to: 0.3, cells: 50}}, {{to: 0.41, cells: 15, ratio: 3}}]
+    x: [{{to: 0.1, cells: 4}}, {{to: 0.3, cells: 20}}, {{to: 2.2, cells: 32, ratio: 8}}]
+    y: [{{to: 0.1, cells: 6, ratio: 0.4}}, {{to: 0.3, cells: 20}}, {{to: 0.41, cells: 6, ratio: 3}}]
   # What happens on the faces x-, x+, y-, y+ of the box; where patches overlap, the one named last decides.
   patches:
     inlet: {{on: x-, velocity: ["min(t, 1)*1.2*y*(0.41 - y)/0.41^2", 0]}}
