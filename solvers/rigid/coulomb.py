@@ -33,7 +33,7 @@ NO_FORCES = "the friction of rigid bodies has no contact forces"
 PROXIMAL = 1e3
 
 #: Change of the contact forces in a proximal step, relative to the largest, at which they are found; or, where forces
-#: vanish, relative to r times the motions, whose rounding errors it is then.
+#: vanish, relative to r times the motions, whose rounding errors they are then.
 FOUND = 1e-13
 
 #: The same, from which on rounding errors may keep them from changing less.
@@ -260,7 +260,8 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
         z = project(before - share * r[:, None] * system.motion(u), touch.friction)[0]
         change = (z - before) / share
         way = float((r * np.linalg.norm(system.motion(u) - system.motion(free), axis=1)).max())
-        if (np.abs(change) <= FOUND * sizes).all() or _found(z, change, last, share, way):
+        vanish = float(np.abs(z).max()) <= FORCE_ROUNDING * float(sizes.max())
+        if (vanish and (np.abs(change) <= FOUND * sizes).all()) or _found(z, change, last, share, way):
             return u, z
         slow = float(np.abs(change).max()) > SLOW_CHANGE * float(np.abs(last).max())
         share = min(LARGEST_SHARE if slow else max(1.0, share), SHARE_GROWTH * share)
