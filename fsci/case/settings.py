@@ -27,8 +27,10 @@ _WIDTH = 60
 
 
 def settings_of(case: Case) -> Settings:
-    """The settings of a case. Files count by what the case has read from them, and meshes not at all; the element of
-    the flow is the one that the case has."""
+    """The settings of a case. Files count by what the case has read from them, and meshes not at all.
+
+    The element of a flow is the one that it has, also where the program chooses it.
+    """
     found: Settings = _plain(case)
     if case.fluid is not None:
         found["fluid"]["element"] = flow_element(case).element

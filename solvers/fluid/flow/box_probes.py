@@ -34,7 +34,7 @@ class CrossesThinBody(ValueError):
 
 @dataclass(frozen=True)
 class PartsInBox:
-    """PartsInBox of cells in the box, each with the Gauss points of a tensor rule."""
+    """Parts of cells in the box, each with the Gauss points of a tensor rule."""
 
     cells: Indices  #: local cells
     low: Array  #: lowest corners of the parts, in the coordinates from 0 to 1 of the cells, shape (n, dim)
