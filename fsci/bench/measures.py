@@ -55,13 +55,14 @@ def _level(scene: FamilyScene, settings: Settings, ended: FamilyRun, values: Map
 def _methods(case: Case) -> dict[str, int]:
     """Larger numbers for better ones."""
     from fsci.case.flow_element import flow_element
+    from fsci.meshes.of_case import degree_of_cells
 
     found: dict[str, int] = {}
     if case.fluid is not None:
         found["element"] = ELEMENTS.index(flow_element(case).element)
         if case.fluid.scheme in SCHEMES:
             found["scheme"] = SCHEMES.index(case.fluid.scheme)
-    orders = [body.mesh.order for body in case.elastic_bodies.values()]
+    orders = [degree_of_cells(case, name) for name in case.elastic_bodies]
     return {**found, "order": min(orders)} if orders else found
 
 

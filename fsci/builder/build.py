@@ -303,7 +303,7 @@ def _notes(case: Case, bodies: list[Body]) -> list[str]:
     meshes = {body.name: body.domain.source for body in bodies if body.domain.source is not None}
     notes = [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes.items() if mesh.note]
     chosen = {name: choose_element(case, name, mesh) for name, mesh in meshes.items()}
-    notes += [f"body '{name}': {one.note}" for name, one in chosen.items() if one.note]
+    notes += [f"body '{name}': {words}" for name, one in chosen.items() for words in one.notes]
     if case.fluid is not None and (flow := flow_element(case)).why:
         notes.append(f"flow: element {flow}")
-    return notes + [f"warning: body '{name}': {one.warning}" for name, one in chosen.items() if one.warning]
+    return notes + [f"warning: body '{name}': {words}" for name, one in chosen.items() for words in one.warnings]

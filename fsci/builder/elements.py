@@ -1,4 +1,4 @@
-"""The element of each elastic body: mixed where the volume hardly changes, if its cells have that element."""
+"""The element of each elastic body: mixed where the volume hardly changes, and what its cells cannot follow."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from fsci.case import Case
 from fsci.case.material import OwnLawSection
+from fsci.meshes.of_case import chooses_order
+from fsci.meshes.slender import bending_error
 from solvers.api import Array
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh
@@ -22,30 +24,47 @@ if TYPE_CHECKING:
 LOCKING = 0.45
 
 
+#: Error in bending from which on the cells of a body deserve a warning.
+TOO_STIFF = 0.05
+
+
 @dataclass(frozen=True)
 class ChosenElement:
     """The element of a body, and what to say of it."""
 
     element: Formulation
-    note: str = ""  #: that the program has chosen the mixed one
-    warning: str = ""  #: that its cells lock
+    notes: tuple[str, ...] = ()  #: that the program has chosen the mixed one, or cells of second order
+    warnings: tuple[str, ...] = ()  #: that its cells lock
 
 
 def choose_element(case: Case, name: str, mesh: Mesh) -> ChosenElement:
     """The element of a body with this mesh: what its case says, else by Poisson's ratio. Raises CaseError."""
-    given = case.elastic_bodies[name].element
-    if given == "mixed":
-        return ChosenElement("mixed")
-    if (nu := nearly_incompressible(case, name, mesh)) is None:
-        return ChosenElement("displacement")
-    kind = CELL_TYPES[mesh.cell_type]
-    if given == "auto" and not kind.shape.simplex:
-        return ChosenElement("mixed", note=f"mixed element for nearly incompressible material (nu = {nu:.4g})")
-    if kind.degree > 1:
-        return ChosenElement("displacement")
-    remedy = "take 'order: 2'" if kind.shape.simplex else "take 'element: auto'"
-    locks = f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); {remedy}"
-    return ChosenElement("displacement", warning=locks)
+    settings, kind = case.elastic_bodies[name], CELL_TYPES[mesh.cell_type]
+    notes, warnings = [], []
+    if chooses_order(settings.mesh) and kind.degree > 1:
+        notes.append("cells of second order, since it is slender")
+    nu = None if settings.element == "mixed" else nearly_incompressible(case, name, mesh)
+    mixed = settings.element == "mixed" or (nu is not None and settings.element == "auto" and not kind.shape.simplex)
+    if nu is not None and mixed:
+        notes.append(f"mixed element for nearly incompressible material (nu = {nu:.4g})")
+    if nu is not None and not mixed and kind.degree == 1:
+        remedy = "take 'order: 2'" if kind.shape.simplex else "take 'element: auto'"
+        locks = f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); {remedy}"
+        warnings.append(locks)
+    elif stiff := _too_stiff(case, name, mesh):
+        # who gives the order has chosen it; who gives a file may not know
+        (notes if "order" in settings.mesh.model_fields_set else warnings).append(stiff)
+    return ChosenElement("mixed" if mixed else "displacement", tuple(notes), tuple(warnings))
+
+
+def _too_stiff(case: Case, name: str, mesh: Mesh) -> str:
+    """That first-order cells bend too little; nothing below TOO_STIFF."""
+    nu = float(np.clip(poisson(*lame_at_cells(case, name, mesh)), 0.0, LOCKING).mean())
+    error = bending_error(mesh, nu)
+    if error < TOO_STIFF:
+        return ""
+    by = f"about {100 * error:.2g} %" if error < 1.0 else f"{1.0 + error:.2g} times"
+    return f"first-order cells make it {by} too stiff in bending; take cells of second order"
 
 
 def nearly_incompressible(case: Case, name: str, mesh: Mesh) -> float | None:

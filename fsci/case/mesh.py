@@ -56,7 +56,11 @@ class FileMesh(PlacedMesh):
     """
 
     file: Text = setting(..., "path of the file, relative to the case file")
-    order: Order = setting(1, "polynomial order of the cells (.geo, and with 'thickness'; other files have theirs)")
+    order: Order = setting(
+        "auto",
+        "polynomial order of the cells (.geo, and with 'thickness'; other files have theirs); auto: 2 for an elastic "
+        "body that is slender, so that it bends, else 1",
+    )
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
     size_factor: Positive = setting(
         1.0,

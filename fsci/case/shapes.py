@@ -42,17 +42,25 @@ class ShapeSection(PlacedMesh):
 
     planned: ClassVar[Callable[..., MeshPlan]]  #: of the settings
     takes: ClassVar[Mapping[str, Takes]]
-    order: Order = setting(1, "polynomial order of the cells")
+    order: Order = setting(
+        "auto", "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, else 1"
+    )
     if TYPE_CHECKING:
         shape: str
         cells: tuple[int, ...]
         cell: str
 
     @property
+    def degree(self) -> int:
+        """Of the cells, unless the body turns out to be slender."""
+        return 1 if self.order == "auto" else self.order
+
+    @property
     def plan(self) -> MeshPlan:
         """Counts, extents and surfaces of the mesh, and how to make it."""
         names = signature(self.planned).parameters
-        return type(self).planned(**{name: getattr(self, name) for name in names})
+        given = {name: getattr(self, name) for name in names}
+        return type(self).planned(**{**given, "order": self.degree})
 
     @property
     def multiples(self) -> tuple[int, ...]:

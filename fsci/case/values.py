@@ -125,7 +125,16 @@ Share = Annotated[
 ]
 Count = Annotated[int, _whole(1), _schema("whole number >= 1", minimum=1)]
 CountOrZero = Annotated[int, _whole(0), _schema("whole number >= 0", minimum=0)]
-Order = Annotated[Literal[1, 2], _whole(1)]
+
+
+def _order(value: Any) -> Any:
+    if value not in ("auto", 1, 2) or isinstance(value, bool):
+        raise fault(f"must be 1, 2 or auto, not {describe_value(value)}")
+    return value if value == "auto" else int(value)
+
+
+Order = Annotated[Literal["auto", 1, 2], BeforeValidator(_order)]
+
 
 _SPACE, _VARIABLES = "xyz", "".join(VARIABLES)
 Formula = Annotated[Expression, _formula(_VARIABLES), _schema("expression of x, y, z, t")]

@@ -14,6 +14,7 @@ from fsci.case.probe_checks import CONTACT_COLUMNS, FRICTION_COLUMNS, known_colu
 from fsci.case.shapes import ShapeSection
 from fsci.case.structure import StructureSection
 from fsci.meshes.nested import cells_of, fluid_dofs
+from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
@@ -95,7 +96,8 @@ def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, Bod
     for name, body in structure.bodies.items():
         text = f"{_name(body.mesh)}, {body.material.law}"
         if isinstance(body.mesh, ShapeSection):
-            text += f", {_count(body.mesh.plan.counts[0], 'cell')} (order {body.mesh.order} {body.mesh.cell})"
+            order = CELL_TYPES[meshes[name].cell_type].degree if name in meshes else body.mesh.order
+            text += f", {_count(body.mesh.plan.counts[0], 'cell')} (order {order} {body.mesh.cell})"
         elif name in meshes:
             mesh = meshes[name]
             text += f", {_count(len(mesh.cells), 'cell')} ({mesh.cell_type})"
@@ -109,10 +111,10 @@ def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) 
     """Unknowns of all elastic bodies; None if a mesh file cannot be read."""
     total = 0
     for name, body in structure.bodies.items():
-        if isinstance(body.mesh, ShapeSection):
-            total += body.mesh.plan.counts[1] * body.mesh.plan.dimension
-        elif name in meshes:
+        if name in meshes:
             total += meshes[name].points.size
+        elif isinstance(body.mesh, ShapeSection):
+            total += body.mesh.plan.counts[1] * body.mesh.plan.dimension
         else:
             return None
     return total

@@ -146,8 +146,8 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         for name in case.elastic_bodies:
             place, mesh = case.place("structure", "bodies", name, "mesh"), found.meshes[name]
             chosen_element = choose_element(case, name, mesh)
-            found.notes += [f"{place}: {words}" for words in [chosen_element.note] if words]
-            found.warnings += [f"{place}: {words}" for words in [chosen_element.warning] if words]
+            found.notes += [f"{place}: {words}" for words in chosen_element.notes]
+            found.warnings += [f"{place}: {words}" for words in chosen_element.warnings]
         for pair in wall_pairs(case, {name: found.meshes[name] for name in case.elastic_bodies}):
             found.walls.setdefault(pair.body, []).append(pair.name)
 

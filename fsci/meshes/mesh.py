@@ -31,6 +31,7 @@ def build_mesh(settings: Any, folder: Path, *, rigid: bool = False) -> Mesh:
         mesh = settings.plan.mesh()
     else:
         order, parameters = getattr(settings, "order", None), getattr(settings, "parameters", None)
+        order = 1 if order == "auto" else order
         size_factor, scale = getattr(settings, "size_factor", 1.0), getattr(settings, "scale", 1.0)
         sheet = None
         if (thickness := getattr(settings, "thickness", None)) is not None:

@@ -24,8 +24,10 @@ from fsci.meshes.checksum import mesh_checksum
 from fsci.meshes.finite_values import require_finite
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
+from fsci.meshes.slender import is_slender
 from fsci.meshes.valid import BadMesh, require_positive, require_valid
 from solvers.fluid.grid.box import FLUSH
+from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.tessellation import is_closed, tessellate
 from solvers.mesh.topology import surface_facets
@@ -71,10 +73,9 @@ def read_body(case: Case, name: str) -> Mesh:
     settings = case.elastic_bodies[name]
     keys: Keys = ("structure", "bodies", name, "mesh")
     try:
-        mesh = build_mesh(settings.mesh, case.folder)
-        if settings.region is not None:
-            keys = ("structure", "bodies", name, "region")
-            mesh = extract_region(mesh, settings.region)
+        mesh = _elastic_mesh(case, name, settings.mesh)
+        if chooses_order(settings.mesh) and is_slender(mesh):
+            mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         _require_dimension(case, name, mesh)
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
@@ -90,6 +91,28 @@ def read_body(case: Case, name: str) -> Mesh:
     _check_lengths(case, name, mesh.points.shape[1])
     require_finite(case, name, mesh, find_locations(case, name, mesh))
     return mesh
+
+
+def chooses_order(mesh: MeshSection) -> bool:
+    """Whether the program chooses the order of the cells of an elastic body: it is not given, and no file has it."""
+    meshed_here = not isinstance(mesh, FileMesh) or mesh.thickness is not None or mesh.file.endswith(".geo")
+    return mesh.order == "auto" and meshed_here
+
+
+def degree_of_cells(case: Case, name: str) -> int:
+    """Degree of the cells of an elastic body, 1 or 2. Raises CaseError."""
+    return CELL_TYPES[read_body(case, name).cell_type].degree
+
+
+def _elastic_mesh(case: Case, name: str, settings: MeshSection) -> Mesh:
+    """The mesh of a body, or its region. Raises MeshError."""
+    mesh, region = build_mesh(settings, case.folder), case.elastic_bodies[name].region
+    if region is None:
+        return mesh
+    try:
+        return extract_region(mesh, region)
+    except MeshError as error:
+        raise case.error(("structure", "bodies", name, "region"), str(error)) from None
 
 
 def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:

@@ -119,10 +119,12 @@ def _facets(case: Case) -> Iterator[Twin]:
 
 def _orders_of_cells(case: Case) -> Iterator[Twin]:
     """Bodies of first order from scripts and built-in shapes get cells of second order; other files have their own."""
+    from fsci.meshes.of_case import chooses_order, degree_of_cells
+
     settings = tuple(
         (f"structure.bodies.{name}.mesh.order", "2")
         for name, body in case.elastic_bodies.items()
-        if body.mesh.order == 1 and (not isinstance(body.mesh, FileMesh) or body.mesh.file.endswith(".geo"))
+        if (chooses_order(body.mesh) or body.mesh.order == 1) and degree_of_cells(case, name) == 1
     )
     if settings:
         yield Twin("order", "elastic bodies of second order", "space", settings)

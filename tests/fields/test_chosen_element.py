@@ -13,7 +13,7 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     beam:
-      mesh: {shape: rectangle, size: [10, 1], cells: [20, 4]}
+      mesh: {shape: rectangle, size: [10, 1], cells: [20, 4], order: 1}
       material: {law: neo_hooke, E: 1000, nu: 0.4999}
       supports: [{on: left, displacement: [0, 0]}]
       tractions: [{on: right, value: [0, 0.01]}]
@@ -24,16 +24,17 @@ solver: {linear: {method: direct}}
 
 MIXED = "mixed element for nearly incompressible material (nu = 0.4999)"
 LOCKS = "first-order cells lock for nearly incompressible material (nu = 0.4999); take "
-BOX = "mesh={shape: box, size: [10, 1, 1], cells: [4, 1, 1]}"
+BOX = "mesh={shape: box, size: [10, 1, 1], cells: [4, 1, 1], order: 1}"
 
 
 def chosen(folder, *changes):
-    """(element, note, warning) of the beam with changes of its settings."""
+    """(element, note, warning) of the beam with changes of its settings, without that it is too stiff in bending."""
     (folder / "case.yaml").write_text(BEAM)
     settings = [change if "." in change.split("=")[0] else f"structure.bodies.beam.{change}" for change in changes]
     case = load_case(folder, [tuple(setting.split("=", 1)) for setting in settings])
     found = choose_element(case, "beam", read_body(case, "beam"))
-    return found.element, found.note, found.warning
+    notes = [note for note in found.notes if "in bending" not in note]
+    return found.element, "".join(notes), "".join(found.warnings)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def chosen(folder, *changes):
         (("element=mixed",), ("mixed", "", "")),
         (("element=displacement",), ("displacement", "", LOCKS + "'element: auto'")),
         (
-            ("mesh={shape: rectangle, size: [10, 1], cells: [4, 1], cell: tri}",),
+            ("mesh={shape: rectangle, size: [10, 1], cells: [4, 1], cell: tri, order: 1}",),
             ("displacement", "", LOCKS + "'order: 2'"),
         ),
         (
