@@ -17,7 +17,7 @@ from solvers.mesh.wall_thickness import wall_thickness
 SLENDER = 5.0
 
 #: Facets whose walls are measured.
-SAMPLE = 400
+WALLS_MEASURED = 400
 
 
 def is_slender(mesh: Mesh) -> bool:
@@ -70,7 +70,7 @@ def _walls(mesh: Mesh) -> _Walls:
     volumes = np.abs(signed_volumes(mesh))
     heights = volumes[rows // len(kind.facets)] / areas * (mesh.points.shape[1] if kind.shape.simplex else 1)
 
-    sample = np.arange(0, len(rows), max(1, len(rows) // SAMPLE))
+    sample = np.arange(0, len(rows), max(1, len(rows) // WALLS_MEASURED))
     walls = wall_thickness(corners.mean(axis=1), vectors / areas[:, None], sample)
     axes = np.linalg.svd(mesh.points - mesh.points.mean(axis=0), full_matrices=False)[2]
     some = walls <= np.ptp(mesh.points @ axes.T, axis=0).max() / SLENDER
