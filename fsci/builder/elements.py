@@ -9,7 +9,7 @@ import numpy as np
 
 from fsci.case import Case
 from fsci.case.material import OwnLawSection
-from fsci.meshes.of_case import chooses_order
+from fsci.meshes.of_case import chooses_order, is_meshed_here
 from fsci.meshes.slender import bending_error
 from solvers.api import Array
 from solvers.mesh.cell_types import CELL_TYPES
@@ -64,7 +64,8 @@ def _too_stiff(case: Case, name: str, mesh: Mesh) -> str:
     if error < TOO_STIFF:
         return ""
     by = f"about {100 * error:.2g} %" if error < 1.0 else f"{1.0 + error:.2g} times"
-    return f"first-order cells make it {by} too stiff in bending; take cells of second order"
+    remedy = "'order: 2'" if is_meshed_here(case.elastic_bodies[name].mesh) else "cells of second order"
+    return f"first-order cells make it {by} too stiff in bending; take {remedy}"
 
 
 def nearly_incompressible(case: Case, name: str, mesh: Mesh) -> float | None:

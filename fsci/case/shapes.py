@@ -43,7 +43,9 @@ class ShapeSection(PlacedMesh):
     planned: ClassVar[Callable[..., MeshPlan]]  #: of the settings
     takes: ClassVar[Mapping[str, Takes]]
     order: Order = setting(
-        "auto", "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, else 1"
+        "auto",
+        "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, and "
+        "in no contact but ties, else 1",
     )
     if TYPE_CHECKING:
         shape: str

@@ -74,7 +74,7 @@ def read_body(case: Case, name: str) -> Mesh:
     keys: Keys = ("structure", "bodies", name, "mesh")
     try:
         mesh = _elastic_mesh(case, name, settings.mesh)
-        if chooses_order(settings.mesh) and is_slender(mesh):
+        if chooses_order(settings.mesh) and not _slides(case, name) and is_slender(mesh):
             mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         _require_dimension(case, name, mesh)
@@ -93,10 +93,24 @@ def read_body(case: Case, name: str) -> Mesh:
     return mesh
 
 
+def is_meshed_here(mesh: MeshSection) -> bool:
+    """Whether the case may say the order of the cells: no file has it."""
+    return not isinstance(mesh, FileMesh) or mesh.thickness is not None or mesh.file.endswith(".geo")
+
+
 def chooses_order(mesh: MeshSection) -> bool:
-    """Whether the program chooses the order of the cells of an elastic body: it is not given, and no file has it."""
-    meshed_here = not isinstance(mesh, FileMesh) or mesh.thickness is not None or mesh.file.endswith(".geo")
-    return mesh.order == "auto" and meshed_here
+    """Whether the program chooses the order of the cells of an elastic body."""
+    return mesh.order == "auto" and is_meshed_here(mesh)
+
+
+def _slides(case: Case, name: str) -> bool:
+    """Whether a body is in contact that is no tie. There first order is more robust: second-order surfaces are clipped
+    as linear parts, and the kinks between them make the active set change."""
+    if case.contact is None:
+        return False
+    named = case.elastic_bodies if case.contact.bodies == "all" else case.contact.bodies or ()
+    pairs = [pair for pair in case.contact.pairs.values() if not pair.tied]
+    return name in named or any(side.body == name for pair in pairs for _, side in pair.sides)
 
 
 def degree_of_cells(case: Case, name: str) -> int:

@@ -35,7 +35,7 @@ TIP = 1e-10 * (4 * (1 - 0.3**2) / 0.1**3 + 1 / (5 / 6 / 2.6 * 0.1))
 
 def settings(changes):
     return [
-        change if change.startswith(("probes", "structure")) else f"structure.bodies.beam.{change}"
+        change if change.startswith(("probes", "structure", "contact")) else f"structure.bodies.beam.{change}"
         for change in changes
     ]
 
@@ -76,7 +76,7 @@ def test_error_of_first_order(tmp_path, mesh):
 
 
 def test_a_beam_by_default(tmp_path):
-    """One cell through the thickness, no numerical setting: 1 %, by the clamped end (first order: 38 %); the run says why."""
+    """One cell through the thickness, no numerical setting: 1 %, by the clamped end; the run says why."""
     moved, said = tip(tmp_path, "mesh={shape: rectangle, size: [1, 0.1], cells: [10, 1]}")
     assert moved == pytest.approx(TIP, rel=0.01)
     assert said.count("body 'beam': cells of second order, since it is slender") == 1
@@ -141,10 +141,27 @@ def test_order_of_scripts_and_files(tmp_path):
 
 def test_an_order_that_is_given_is_a_note(tmp_path):
     given = chosen(tmp_path, "mesh={shape: rectangle, size: [1, 0.1], cells: [20, 2], order: 1}")
-    assert given.notes == ("first-order cells make it about 15 % too stiff in bending; take cells of second order",)
+    assert given.notes == ("first-order cells make it about 15 % too stiff in bending; take 'order: 2'",)
     assert given.warnings == ()
     fine = chosen(tmp_path, "mesh={shape: rectangle, size: [1, 0.1], cells: [60, 4], order: 1}")
     assert (fine.notes, fine.warnings) == ((), ())
+
+
+def test_order_in_contact(tmp_path):
+    """Slender bodies that slide keep first order, with a warning; ties do not matter."""
+    words = ("contact={obstacles: {wall: {mesh: {shape: disc, radius: 0.1, cells: [8, 2], translate: [0.5, -0.2]}}}}",)
+    pair = "{slave: {body: beam, on: bottom}, master: {obstacle: wall}}"
+    case = load(tmp_path, *words, f"contact.pairs.touch={pair}")
+    body = read_body(case, "beam")
+    found = choose_element(case, "beam", body)
+    assert (body.cell_type, found.notes) == ("quad", ())
+    assert found.warnings == ("first-order cells make it about 15 % too stiff in bending; take 'order: 2'",)
+    assert read_body(load(tmp_path, "contact={bodies: all}"), "beam").cell_type == "quad"
+    other = "{mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], origin: [0, -1]}"
+    other += ", material: {law: neo_hooke, E: 1, nu: 0.3}}"
+    tie = "{slave: {body: beam, on: bottom}, master: {body: block, on: top}, tied: true}"
+    tied = load(tmp_path, f"structure.bodies.block={other}", f"contact.pairs.tie={tie}", "probes={}")
+    assert read_body(tied, "beam").cell_type == "quad9"
 
 
 def test_order_in_check_and_messages(tmp_path):

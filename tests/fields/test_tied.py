@@ -74,11 +74,11 @@ structure:
   dynamics: {rho_inf: 1.0}
   bodies:
     inner:
-      mesh: {shape: ring, inner_radius: 1.0, outer_radius: 1.5, cells: [24, 2]}
+      mesh: {shape: ring, inner_radius: 1.0, outer_radius: 1.5, cells: [24, 2], order: 1}
       material: {law: st_venant_kirchhoff, E: 100, nu: 0.3, density: 1}
       initial_velocity: [-y, x]
     outer:
-      mesh: {shape: ring, inner_radius: 1.5, outer_radius: 2.0, cells: [31, 2]}
+      mesh: {shape: ring, inner_radius: 1.5, outer_radius: 2.0, cells: [31, 2], order: 1}
       material: {law: st_venant_kirchhoff, E: 50, nu: 0.3, density: 1}
       initial_velocity: [-y, x]
 contact:

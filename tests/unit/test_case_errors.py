@@ -88,7 +88,7 @@ MISTAKES = [
     ("rho_inf: 0.8", "rho_inf: 1.8", "5:23: 'rho_inf' must be from 0 to 1, not 1.8", "1.8"),
     ("[4, 2]", "[4, 0]", "8:57: entry 2 of 'cells' must be at least 1, not 0", "0"),
     ("[4, 2]", "[4, 2, 1]", "8:53: 'cells' must have 2 entries, not 3", "[4, 2, 1]"),
-    ("[4, 2]", "[4, 2], order: 3", "8:68: 'order' must be 1 or 2, not 3", "3"),
+    ("[4, 2]", "[4, 2], order: 3", "8:68: 'order' must be 1, 2 or auto, not 3", "3"),
     ("length: m,", "length: inch,", "2:17: 'length' must be 'km', 'm', 'dm', 'cm', 'mm' or 'um', not 'inch'", "inch"),
     (
         "statistic: min,",
