@@ -76,9 +76,7 @@ def _finding(
     while levels[0].run.size < 1.0 and levels[0].ended.message:
         levels = levels[1:]
     finest = levels[0].values.get(name)
-    # on a grid without a symmetry a value that is zero by it has a size
-    sized = [*levels, *(one for one in runs if one.run.role == "shift")]
-    scale = max((one.values[name].scale for one in sized if name in one.values), default=0.0)
+    scale = max((one.values[name].scale for one in levels if name in one.values), default=0.0)
     known = replace(
         _evidence(runs, levels, lambda one: _value(one, name), scale),
         sampling=0.0 if finest is None else finest.sampling,
