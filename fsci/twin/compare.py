@@ -11,9 +11,9 @@ import numpy as np
 
 from fsci.case.verify import COUNTERS
 from fsci.running.history import History
-from fsci.twin.zero import Scales
+from fsci.twin.zero import CharacteristicScales
 
-NO_SCALES = Scales()
+NO_SCALES = CharacteristicScales()
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class TwinChange:
 def values(
     history: History,
     summary: Mapping[str, Any],
-    scales: Scales = NO_SCALES,
+    scales: CharacteristicScales = NO_SCALES,
     opposite: Collection[str] = (),
 ) -> dict[str, Value]:
     """All that can be compared of a run: columns of probes, and numbers of `verify` with a reference.

@@ -11,15 +11,15 @@ from fsci.plot.units import INTENSIVE, OF_FORCE, Powers
 #: Difference, relative to the largest value of its unit, that rounding explains: solvers stop at the same iterate.
 ROUNDING = 1e-8
 #: The same of a direct solver, on whose grid a value is zero by symmetry.
-EXACT = 1e-12
+ZERO_BESIDE = 1e-12
 
 SPEED: Powers = (1, 0, -1)
 PURE_NUMBER: Powers = (0, 0, 0)
-GEOMETRY = (0, 0)  #: powers of mass and time of lengths, areas and volumes
+OF_GEOMETRY = (0, 0)  #: powers of mass and time of lengths, areas and volumes
 
 
 @dataclass(frozen=True)
-class Scales:
+class CharacteristicScales:
     """What numbers of different units are compared by.
 
     With the length L of the box and the density r of a flow, moments and energies are of the size of a force times L,
@@ -35,14 +35,14 @@ class Scales:
     def scale(self, name: str, own: float, sizes: Mapping[str, float]) -> float:
         """What changes of a column are relative to, by the largest numbers of its probe and of all columns.
 
-        That of its probe, but not less than ROUNDING of what others say; what is EXACT zero beside these has their
+        That of its probe, but not less than ROUNDING of what others say; what is zero beside these has their
         size.
         """
         unit = self.powers.get(name)
         if unit is None:
             return own
         others = max(self._as(unit, self.powers.get(other), size) for other, size in sizes.items())
-        return others if own <= EXACT * others else max(own, ROUNDING * others)
+        return others if own <= ZERO_BESIDE * others else max(own, ROUNDING * others)
 
     def _as(self, unit: Powers, other: Powers | None, size: float) -> float:
         """The size of a number in another unit; 0 where nothing follows."""
@@ -50,7 +50,7 @@ class Scales:
             return size
         if unit == PURE_NUMBER:
             return 1.0
-        if self.length is None or other is None or unit[1:] == GEOMETRY:
+        if self.length is None or other is None or unit[1:] == OF_GEOMETRY:
             return 0.0
         if other[1:] == unit[1:]:
             return size * self.length ** (unit[0] - other[0])
@@ -58,7 +58,7 @@ class Scales:
         return self.density * size**2 * self.length ** (unit[0] + 1) if inertia else 0.0
 
 
-def scales(case: Case) -> Scales:
+def scales(case: Case) -> CharacteristicScales:
     """Of the columns of the probes of a case."""
     dimension = case.dimension or 3
     powers: dict[str, Powers] = {}
@@ -67,6 +67,8 @@ def scales(case: Case) -> Scales:
         per_depth = int(dimension == 2 and probe.measured.name not in INTENSIVE)
         powers |= dict.fromkeys(probe.columns(key, dimension), (length - per_depth, mass, time))
     if case.fluid is None:
-        return Scales(powers)
+        return CharacteristicScales(powers)
     grid = case.fluid.grid
-    return Scales(powers, max(b - a for a, b in zip(grid.start, grid.to, strict=True)), case.fluid.density)
+    return CharacteristicScales(
+        powers, max(b - a for a, b in zip(grid.start, grid.to, strict=True)), case.fluid.density
+    )

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from fsci.case import load_case
-from fsci.twin.zero import Scales, scales
+from fsci.twin.zero import CharacteristicScales, scales
 
 SPEED, STRESS, FORCE, MOMENT, FLOW_RATE, LENGTH = (1, 0, -1), (-1, 1, -2), (1, 1, -2), (2, 1, -2), (3, 0, -1), (1, 0, 0)
 CASES = Path(__file__).parents[2] / "cases"
@@ -13,7 +13,9 @@ CASES = Path(__file__).parents[2] / "cases"
 
 def size(unit, other, **settings):
     """That in `unit` of a number 3 of another one; the column itself is zero."""
-    return Scales({"zero": unit, "other": other}, **settings).scale("zero", 0.0, {"zero": 0.0, "other": 3.0})
+    return CharacteristicScales({"zero": unit, "other": other}, **settings).scale(
+        "zero", 0.0, {"zero": 0.0, "other": 3.0}
+    )
 
 
 @pytest.mark.parametrize(
@@ -39,7 +41,9 @@ def test_sizes_in_a_flow(unit, other, expected):
 def test_units_do_not_matter(factor):
     """Lengths in other units: a moment of force times length follows."""
     force, length = 3.0 * factor, 0.5 * factor
-    found = Scales({"zero": MOMENT, "other": FORCE}, length).scale("zero", 0.0, {"zero": 0.0, "other": force})
+    found = CharacteristicScales({"zero": MOMENT, "other": FORCE}, length).scale(
+        "zero", 0.0, {"zero": 0.0, "other": force}
+    )
     assert found == pytest.approx(1.5 * factor**2)
 
 
@@ -50,7 +54,7 @@ def test_without_a_flow_only_one_unit_is_compared():
 
 @pytest.mark.parametrize(("own", "expected"), [(0.0, 1.0), (9e-13, 1.0), (1e-11, 1e-8), (1e-7, 1e-7), (1.0, 1.0)])
 def test_small_numbers_keep_their_own_size(own, expected):
-    found = Scales({"own": SPEED, "other": SPEED}).scale("own", own, {"own": own, "other": 1.0})
+    found = CharacteristicScales({"own": SPEED, "other": SPEED}).scale("own", own, {"own": own, "other": 1.0})
     assert found == pytest.approx(expected)
 
 
