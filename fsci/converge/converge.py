@@ -16,7 +16,7 @@ from fsci.converge.page import write_page
 from fsci.converge.plan import SECONDS_TO_START, Plan, PlannedRun, Refused
 from fsci.converge.results import BandedValue, Done, as_json, done, findings
 from fsci.converge.values import wanted
-from fsci.converge.words import helps, percent, run_row, seconds_in_words, sentences, settings
+from fsci.converge.words import helps, percent, run_row, seconds_in_words, sentences, settings, without_results
 from fsci.running.files import write_text
 from fsci.running.kept_case import keep_case
 from fsci.running.summary import plain
@@ -161,7 +161,7 @@ class LevelStudy:
     def tell(self) -> None:
         """The values with their bands; the settings that reach the tolerance; the page."""
         lines = [line for name, one in self.found.items() for line in sentences(name, one, self.runs)]
-        self.say("\n" + "\n".join([*lines, *helps(self.runs, self.found)]))
+        self.say("\n" + "\n".join([*lines, *without_results(self.runs), *helps(self.runs, self.found)]))
         if self.tolerance is not None:
             self.say(self._reach(self.tolerance))
         self.write()

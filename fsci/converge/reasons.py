@@ -32,7 +32,8 @@ def _backward_euler(case: Case) -> Iterator[str]:
 def _impacts(case: Case, history: History) -> Iterator[str]:
     """Contact that begins while inertia counts."""
     active = history.get("contact.active", np.zeros(0))
-    free = case.fluid is not None and bool(case.fluid.free_bodies)
+    sections = (case.fluid, case.rigid_section)  # a free obstacle of a statical case has no inertia
+    free = any(section is not None and section.free_bodies for section in sections)
     moves = free or (case.structure is not None and case.structure.dynamics is not None)
     if moves and len(active) and active.max() > 0 and (active == 0).any():
         yield "an impact"

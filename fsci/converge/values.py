@@ -15,8 +15,8 @@ from fsci.case.errors import Place, Problem, did_you_mean
 from fsci.case.verify import COUNTERS, Check
 from fsci.running.history import History
 from fsci.running.verify import extremes, window
-from fsci.twin.compare import units
 from fsci.twin.compare import values as twin_values
+from fsci.twin.zero import scales
 
 Array = NDArray[np.float64]
 #: Statistics that take one sample of a curve.
@@ -42,7 +42,7 @@ def observed(case: Case, history: History, summary: Mapping[str, Any]) -> dict[s
     """
     found = {
         name: Observed(value.value, value.scale, 0.0, value.time, value.curve)
-        for name, value in twin_values(history, {"probes": summary.get("probes", ())}, units(case)).items()
+        for name, value in twin_values(history, {"probes": summary.get("probes", ())}, scales(case)).items()
     }
     for check, result in zip(case.verify, summary.get("verify", ()), strict=True):
         name = result["name"]

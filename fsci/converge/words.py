@@ -60,6 +60,13 @@ def _twin(name: str, words: str, value: float, found: BandedValue) -> str:
     return f"{verdict}levels say {say}, but {words} gives {value:.6g}{change}"
 
 
+def without_results(runs: Sequence[Done]) -> Iterator[str]:
+    """Other elements and schemes that have failed, and why: no value has been compared with theirs."""
+    for one in runs:
+        if one.run.role == "twin" and one.ended.message:
+            yield f"{one.run.twin.words}: no result: {one.ended.message.splitlines()[0]}"
+
+
 def helps(runs: Sequence[Done], found: Mapping[str, BandedValue]) -> list[str]:
     """Settings that help where a twin is outside."""
     told = [one.estimate for one in found.values() if one.estimate.verdict == "not resolved"]
@@ -87,14 +94,14 @@ def percent(share: float) -> str:
 
 
 def _with_band(value: float, band: float) -> str:
-    """A value to two digits of its band."""
+    """A value to two digits of its band; zero has no sign."""
     if band <= 0.0:
         return f"{value:.6g} +- 0"
     place = 1 - math.floor(math.log10(band))
     if not -3 <= place <= 6 or abs(value) >= 1e6:
         digits = max(2, math.floor(math.log10(max(abs(value), band))) + 1 + place)
         return f"{value:.{min(digits, 12)}g} +- {band:.2g}"
-    return f"{value:.{max(place, 0)}f} +- {band:.{max(place, 0)}f}"
+    return f"{value:z.{max(place, 0)}f} +- {band:.{max(place, 0)}f}"
 
 
 def seconds_in_words(seconds: float) -> str:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from fsci.case import Case
 from fsci.case.verify import COUNTERS
 from fsci.running.history import History
+from fsci.twin.zero import CharacteristicScales
 
-#: Difference, relative to the largest value of its unit, that rounding explains: solvers stop at the same iterate.
-ROUNDING = 1e-8
+NO_SCALES = CharacteristicScales()
 
 
 @dataclass(frozen=True)
@@ -39,22 +37,16 @@ class TwinChange:
     curve: float  #: the largest over time
 
 
-def units(case: Case) -> dict[str, tuple[int, int, int]]:
-    """By column of a probe: the powers of length, mass and time in its unit."""
-    dimension = case.dimension or 3
-    return {name: probe.measured.powers for key, probe in case.probes.items() for name in probe.columns(key, dimension)}
-
-
 def values(
     history: History,
     summary: Mapping[str, Any],
-    unit: Mapping[str, tuple[int, int, int]] = MappingProxyType({}),
+    scales: CharacteristicScales = NO_SCALES,
     opposite: Collection[str] = (),
 ) -> dict[str, Value]:
     """All that can be compared of a run: columns of probes, and numbers of `verify` with a reference.
 
-    The scale of a column is the largest number in the columns of its probe, but not less than ROUNDING of the largest
-    in columns of its unit: what is smaller is zero. That of a number is its own size. What `verify` compares with zero
+    The scale of a column is the largest number in the columns of its probe, or that of other columns if it
+    is zero beside them. That of a number is its own size. What `verify` compares with zero
     is an error of the method, and no value; nor are COUNTERS. Columns in `opposite` have the other sign.
     """
     columns = [name for name in summary.get("probes", ()) if name in history]
@@ -62,9 +54,8 @@ def values(
     found = {}
     for name in columns:
         of_probe = max(size[other] for other in columns if _probe(other) == _probe(name))
-        of_unit = max((size[other] for other in columns if name in unit and unit.get(other) == unit[name]), default=0.0)
         curve = history[name] * (-1.0 if name in opposite else 1.0)
-        found[name] = Value(float(curve[-1]), max(of_probe, ROUNDING * of_unit), history["time"], curve)
+        found[name] = Value(float(curve[-1]), scales.scale(name, of_probe, size), history["time"], curve)
     for check in summary.get("verify", ()):
         column = check["name"].split()[0]
         if check["value"] is not None and check["reference"] != 0.0 and column not in (*columns, *COUNTERS):

@@ -18,9 +18,10 @@ from fsci.running.summary import plain
 from fsci.running.verify import evaluate
 from fsci.running.warm import WarmProcess
 from fsci.twin.changes import Meaning, Twin, quick, twins
-from fsci.twin.compare import ROUNDING, TwinChange, Value, changes, units, values
+from fsci.twin.compare import TwinChange, Value, changes, values
 from fsci.twin.grids import NO_FIELDS, Settings
 from fsci.twin.runs import TwinEnded, known_runs, run_all
+from fsci.twin.zero import ROUNDING, scales
 
 TWIN_RESULTS = "twin.json"
 BASE = Twin("case", "the case itself", "defect")
@@ -100,13 +101,13 @@ def _compared(
     base = ended.get(BASE.name)
     if base is None or base.message:
         return {}, {}
-    unit = units(case)
-    own = values(base.history, base.summary, unit)
+    of_case = scales(case)
+    own = values(base.history, base.summary, of_case)
     found = {}
     for twin in runs[1:]:
         one = ended.get(twin.name)
         if one is not None and not one.message:
-            found[twin.name] = changes(own, values(one.history, one.summary, unit, twin.opposite))
+            found[twin.name] = changes(own, values(one.history, one.summary, of_case, twin.opposite))
     return own, found
 
 
@@ -168,7 +169,8 @@ def _table(case: Case, runs: Sequence[Twin], ended: Mapping[str, TwinEnded]) -> 
             else f"{name} {_percent(change)}: {SAYINGS[members[0].meaning]}"
         )
         lines.append(f"{kind}: {words}: {saying}")
-    return lines
+    failed = [ended[twin.name] for twin in runs[1:] if ended[twin.name].message]
+    return [*lines, *(f"{one.twin.name}: {one.twin.words}: failed: {one.message.splitlines()[0]}" for one in failed)]
 
 
 def _percent(share: float) -> str:

@@ -34,6 +34,7 @@ fluid:
 probes:
   drag: {body: disc, quantity: force}
   dp: {quantity: pressure, at: [0.3, 0.5], minus: [1.7, 0.5]}
+  across: {quantity: pressure, at: [0.5, 0.25], minus: [0.5, 0.75]}
 """
 
 #: A ring under pressure from inside (Lame): u = 1.3e-3 (0.4 r + 4 / r) / 3.
@@ -117,6 +118,11 @@ def test_a_flow(tmp_path):
     assert found["runs"]["coarser_2"]["values"]["drag.x"] != drag["value"]
     assert "element q2q1, cells twice as large" in ended.stdout
     assert "data:image/png" in (tmp_path / "out" / "report.html").read_text()
+    # zero by symmetry, but for grids that are moved: its band is beside the drag, not beside its rounding
+    across = found["values"]["across"]
+    assert abs(across["value"]) < 1e-9 < across["band"] < 0.05 * across["scale"]
+    assert across["verdict"] == "resolved"
+    assert "across 0.0" in ended.stdout
 
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*/history.csv")}
     again, only = converge(tmp_path, FLOW, "--probe", "drag.x", "--tolerance", "10%")

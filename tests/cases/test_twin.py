@@ -81,6 +81,18 @@ def test_a_flow(tmp_path):
     assert other["values"]["drag.x"]["value"] > 1.05 * drag["value"]
 
 
+def test_what_is_zero_by_symmetry(tmp_path):
+    """A difference of pressures above and below, beside a drag: rounding is no change, and no defect of the program."""
+    text = FLOW + "  across: {quantity: pressure, at: [0.5, 0.25], minus: [0.5, 0.75]}\n"
+    ended, found = twin(
+        tmp_path, text, "--only", "shift", "--only", "mirrored", "--only", "turned", "--only", "element"
+    )
+    changes = found["values"]["across"]["changes"]
+    assert max(changes[name]["curve"] for name in ("mirrored", "turned", "element")) < 1e-9
+    assert 1e-5 < max(changes[f"shift_{n}"]["curve"] for n in range(1, 9)) < 0.05
+    assert "the answer must not depend on it" not in ended.stdout
+
+
 def test_blocks(tmp_path):
     """Uniform strain: neither roles, orders nor c_n change anything, and the force on the slave turns round."""
     ended, found = twin(tmp_path, BLOCKS)
@@ -99,6 +111,9 @@ def test_a_twin_that_fails_is_a_finding(tmp_path):
     ended, found = twin(tmp_path, text, "--only", "coarse", code=1)
     assert "not of the finest level" in found["runs"]["coarse"]["message"]
     assert found["runs"]["coarse"]["message"] in ended.stdout
+    last = ended.stdout.splitlines()[-1]
+    assert last.startswith("coarse: element q2q1, cells twice as large: failed: ")
+    assert last.endswith(": refine around it with 3 layers or more, or in a box over all of its way")
     assert found["runs"]["case"]["message"] == ""
 
 

@@ -15,7 +15,7 @@ from fsci.twin.changes import Twin
 from fsci.twin.runs import TwinEnded
 
 PLAN = SimpleNamespace(
-    case=SimpleNamespace(fluid=None, structure=None), fixed=(), unchanged=lambda runs: []
+    case=SimpleNamespace(fluid=None, structure=None, rigid_section=None), fixed=(), unchanged=lambda runs: []
 )  # no reason to trust no band
 
 

@@ -35,6 +35,20 @@ def test_impacts(active, impact):
     assert ("an impact" in slow, "an impact" in told) == (impact, impact)
 
 
+RIGID = """
+time: {step: 0.1, end: 2}
+rigid: {bodies: {ball: {mesh: {shape: disc, radius: 0.1, cells: [24, 1]}, density: 1}}}
+probes: {ball: {body: ball, quantity: displacement, at: [0, 0]}}
+"""
+
+
+def test_impacts_of_rigid_bodies(tmp_path):
+    (tmp_path / "case.yaml").write_text(RIGID)
+    case = load_case(tmp_path)
+    history = {"contact.active": np.array([0, 1, 0])}
+    assert first_order(case, history, {}) == indicative(case, history, {}) == ["an impact"]
+
+
 def film(body, to, cells, warns=True):
     return {"body": body, "to": to, "cells": cells, "warns": warns}
 

@@ -17,7 +17,7 @@ def run(*checks, **columns):
     history = {"time": TIME, **{name.replace("_", "."): value for name, value in columns.items()}}
     made = [Check(**{"relative": 1.0, **check}) for check in checks]
     summary = {"probes": {name: {} for name in history if name != "time"}, "verify": evaluate(history, made)}
-    return observed(SimpleNamespace(verify=made, probes={}, dimension=2), history, summary)
+    return observed(SimpleNamespace(verify=made, probes={}, dimension=2, fluid=None), history, summary)
 
 
 def test_columns_and_checks():

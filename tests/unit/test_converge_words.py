@@ -9,7 +9,7 @@ from fsci.converge.page import write_page
 from fsci.converge.plan import PlannedRun
 from fsci.converge.results import BandedValue, Done
 from fsci.converge.values import Distance, Observed
-from fsci.converge.words import helps, run_row, seconds_in_words, sentences, settings
+from fsci.converge.words import helps, run_row, seconds_in_words, sentences, settings, without_results
 from fsci.twin.changes import Twin
 from fsci.twin.runs import TwinEnded
 
@@ -72,6 +72,7 @@ def test_values_without_a_band():
         (123456.0, 789.0, "123456 +- 789"),
         (7.654321e8, 1.2e4, "7.65432e+08 +- 1.2e+04"),
         (3.0, 0.0, "3 +- 0"),
+        (-1e-16, 0.0062, "0.0000 +- 0.0062"),
     ],
 )
 def test_digits_are_those_of_the_band(value, band, text):
@@ -87,6 +88,16 @@ def test_digits_are_those_of_the_band(value, band, text):
 def test_rows_of_runs():
     assert run_row(done()) == "element          2.0 s  element q2q1"
     assert run_row(done(message="no way\nmore")) == "element          2.0 s  no way"
+
+
+def test_a_method_that_fails():
+    """Its value is compared with none: that is said once."""
+    runs = [
+        done("coarser_2", role="level", message="too large"),
+        done(),
+        done("order", "second order", message="no\nmore"),
+    ]
+    assert list(without_results(runs)) == ["second order: no result: no"]
 
 
 def test_times():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fsci.twin.compare import changes, values
+from fsci.twin.zero import CharacteristicScales
 
 TIME = np.array([1.0, 2.0, 3.0, 4.0])
 
@@ -27,13 +28,13 @@ def test_what_is_zero_but_for_rounding():
     def zero(noise):
         history = {"time": TIME, "at_rest": noise + 0.0 * TIME, "speed": 2.0 + 0.0 * TIME, "mass": noise + 0.0 * TIME}
         speed = (1, 0, -1)
-        return values(
-            history, {"probes": dict.fromkeys(history)}, {"at_rest": speed, "speed": speed, "mass": (0, 1, 0)}
-        )
+        powers = CharacteristicScales({"at_rest": speed, "speed": speed, "mass": (0, 1, 0)})
+        return values(history, {"probes": dict.fromkeys(history)}, powers)
 
     found = changes(zero(1e-17), zero(3e-17))
-    assert found["at_rest"].curve == pytest.approx(1e-9)
+    assert found["at_rest"].curve == pytest.approx(1e-17)
     assert found["mass"].curve == pytest.approx(2.0 / 3.0)
+    assert changes(zero(1e-9), zero(3e-9))["at_rest"].curve == pytest.approx(0.1)
 
 
 def test_the_largest_difference_over_time():
