@@ -19,9 +19,9 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array, State
 from solvers.fluid.cut.cut import Cut
-from solvers.fluid.cut.film import coercive, film_cells
+from solvers.fluid.cut.film import film_cells
 from solvers.fluid.cut.weights import Weights
-from solvers.fluid.geometry.pieces import NOTHING, Pieces
+from solvers.fluid.geometry.pieces import Pieces
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.space import Unknowns, set_velocity
 from solvers.fluid.settings.flow_settings import FlowSettings
@@ -40,6 +40,7 @@ from solvers.fluid.terms.closed_contact.zone import ClosedZone, find_zone
 from solvers.fluid.terms.closed_contact.zone_entries import with_zone
 from solvers.fluid.terms.closed_contact.zone_seepage import ZoneSeepage
 from solvers.fluid.terms.coupling_entries import InterfaceEntries, interface_entries
+from solvers.fluid.terms.film_penalty import least_in_films
 from solvers.fluid.terms.gap_terms import GapTerms
 from solvers.fluid.terms.interface import InterfaceTerms
 from solvers.fluid.terms.poorly_cut.ghost import FaceFlow, Scales
@@ -120,6 +121,7 @@ class FlowSystem:
         #: facets with fluid pressure in closed contact, and their transmissivity there [m^3]; None: none, no seepage
         self.may_close, self.seeping = may_close(surfaces), seeping(surfaces)
         self._interface: InterfaceTerms | None = None
+        self._least = np.zeros(0)  #: least penalty of pieces in films [Pa s/m], zero where another is larger
         self._touched = True  #: surfaces cut cells, on any process; terms of surfaces that do not are zero
         self._zone: ClosedZone | None = None
         self._seepage: ZoneSeepage | None = None
@@ -253,7 +255,7 @@ class FlowSystem:
         g = at.at_corners(cut.motion.v, self.sweep_velocity)
         if degree > 1:
             assert self.forms.films is not None
-            return film_derivatives(at, self.unknowns, self.weights, cut, self.forms.films, g)
+            return film_derivatives(at, self.unknowns, self.weights, cut, self.forms.films, g, self._least)
         assert self.gaps is not None
         assert self.forms.moving is not None
         # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
@@ -322,15 +324,9 @@ class FlowSystem:
         flow = self.viscosity.of(cells), settings.density, float(self._alpha.value)
         speeds, sizes = (self.speed[cells], g * settings.convection), self.grid.sizes[cells]
         reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
-        least: Array | float = 0.0
-        if cut.creeping is not None:
-            # closed films have no fluid whose penalty would have to be larger
-            share = np.where(cut.fraction[cells] > NOTHING, cut.fraction[cells], np.inf)
-            volume, area = share * sizes.prod(axis=1), pieces.area.sum(axis=1)
-            least = coercive(cut.creeping[self.grid.numbers[cells]], pieces.cell, volume, area)
-        return nitsche.penalties(
-            flow, settings.penalties, settings.degree, pieces.normal, sizes, *speeds, reduced, least
-        )
+        least, shape = least_in_films(cut, self.grid), (settings.penalties, settings.degree, pieces.normal, sizes)
+        self._least = np.where(least > nitsche.viscous_penalty(*shape, reduced), flow[0] * least, 0.0)
+        return nitsche.penalties(flow, *shape, *speeds, reduced, least)
 
     def _slip_inertia(self, pieces: Pieces, cut: Cut) -> Array | None:
         """rho gamma_t h sum_k beta_k s_{n-k} at the corners of pieces [Pa], (pieces, dim); None: zero."""

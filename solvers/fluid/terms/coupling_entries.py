@@ -20,6 +20,7 @@ from solvers.algebra.sparse import Sparse, sparse_from_entries
 from solvers.api import Array
 from solvers.exchange import InterfaceEntries
 from solvers.fluid.mesh.space import Unknowns
+from solvers.fluid.terms.film_penalty import PenaltyDerivatives
 from solvers.fluid.terms.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.terms.shape_derivatives.cut_shape import CutDerivatives
 from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives
@@ -59,11 +60,17 @@ def interface_entries(
         into = sums.with_flow(alpha * C + by_shape, *(() if of_sweep is None else of_sweep.rows(operator)))
         if shape is not None:
             into = into + sums.of_films(shape)
+    by_penalty = None
+    if isinstance(shape, FilmDerivatives) and shape.penalty is not None:
+        of_rows, by_penalty = sums.of_penalty(shape.pieces, shape.penalty)
+        into = into + of_rows
     if of_sweep is not None:
         load_by_shape = load_by_shape + of_sweep.force
     into.data[held[into.indices]] = 0.0
     back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
+    if by_penalty is not None:
+        load = load + by_penalty
     if unknowns.grid.comm.size > 1:
         into, back = (part.with_columns(unknowns.global_dofs, unknowns.size()) for part in (into, back))
     return InterfaceEntries(into, back, load)
@@ -159,6 +166,19 @@ class _Sums:
         into, by = rows[..., None], films.dofs[some][:, None, None]
         into, by, values = (np.broadcast_to(part, blocks.shape).ravel() for part in (into, by, blocks))
         return sparse_from_entries(into, by, values, (self._shape[0] * self._dim, self._shape[1]))
+
+    def of_penalty(self, pieces: NDArray[np.int64], of: PenaltyDerivatives) -> tuple[Sparse, Sparse]:
+        """As `of_films` and `with_surface`: what the penalty adds, which depends on all pieces in a cell."""
+        some = self._ours[pieces]
+        corner = (np.cumsum(self._ours) - 1)[pieces[some]]
+        at = self._corner[corner][:, :, None] * self._dim + np.arange(self._dim)
+        cell = np.broadcast_to(of.cell[some, None, None], at.shape).ravel()
+        shape, (cells, columns) = (self._shape[0] * self._dim, len(of.rows)), of.rows.shape
+        growth, force = (
+            sparse_from_entries(at.ravel(), cell, part[some].ravel(), shape) for part in (of.growth, of.force)
+        )
+        of_cells = np.repeat(np.arange(cells), columns), of.dofs.ravel(), of.rows.ravel()
+        return growth @ sparse_from_entries(*of_cells, (cells, self._shape[1])), force @ growth.T
 
     def with_surface(self, blocks: Array) -> Sparse:
         """The matrix of blocks (pieces, vertices, vertices, dim, dim); columns are dofs of the vertices."""

@@ -81,12 +81,17 @@ def penalties(
     flow: mu [Pa s] (by pieces if it varies), rho [kg/m^3], alpha [1/s]; n, edge lengths of the cells [m], g [m/s]:
     (pieces, dim); speed: |a| [m/s], (pieces,).
     """
-    (mu, rho, alpha), dim = flow, n.shape[1]
-    h = 1.0 / np.linalg.norm(n / sizes, axis=1)
-    viscous = np.maximum(factors.nitsche * TRACE[dim, degree] / (reduced * h), least)
+    mu, rho, alpha = flow
+    viscous = np.maximum(viscous_penalty(factors, degree, n, sizes, reduced), least)
     s = mu * viscous + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, n))
     normal = rho * factors.convection * speed + slip_mass(rho, factors, n, sizes) * alpha
-    return s[:, None, None] * np.eye(dim) + normal[:, None, None] * n[:, :, None] * n[:, None, :]
+    return s[:, None, None] * np.eye(n.shape[1]) + normal[:, None, None] * n[:, :, None] * n[:, None, :]
+
+
+def viscous_penalty(factors: Penalties, degree: int, n: Array, sizes: Array, reduced: Array | float = 1.0) -> Array:
+    """gamma C_T / (r h) of pieces [1/m], (pieces,); see `penalties`."""
+    penalty: Array = factors.nitsche * TRACE[n.shape[1], degree] / reduced * np.linalg.norm(n / sizes, axis=1)
+    return penalty
 
 
 def slip_mass(rho: float, factors: Penalties, n: Array, sizes: Array) -> Array:

@@ -39,11 +39,12 @@ class FilmIntegrands:
         numbers, (n, parameters, origin, g, slope, force, zero) = _symbols(
             domain, (dim,), (PARAMETERS,), (dim,), (dim,), (dim, dim), (dim,), (1,)
         )
-        n, force = ufl.variable(n), ufl.variable(force)
+        n, force, parameters = ufl.variable(n), ufl.variable(force), ufl.variable(parameters)
         g = ufl.variable(g + ufl.dot(slope, ufl.SpatialCoordinate(domain.mesh) - origin))
         terms = flow, n, parameters, u - g, u, p
         on_rows, on_force = _surface(*terms, v, q), ufl.diff(_surface(*terms, force, zero[0]), force)
-        moved, what = (_moved(f, n, frozen=(g, slope)) for f in (on_rows, on_force)), "the derivative of films"
+        what = "the derivative of films"
+        moved = (_moved(f, n, frozen=(g, slope)) + _by_penalty(f, parameters) for f in (on_rows, on_force))
         rows, force = (fem.Pointwise(domain, ufl.as_vector(part), self._points, what) for part in moved)
         return numbers, rows, force
 
@@ -53,7 +54,7 @@ class FilmIntegrands:
             part.compile()
 
     def on(self, at: InterfaceTerms, some: NDArray[np.int64], origin: Array, g: Array) -> tuple[Array, Array]:
-        """Rows and force of some pieces, (pieces, points, 1 + 2 dim, rows or components).
+        """Rows and force of some pieces, (pieces, points, 2 + 2 dim, rows or components); df/ds last.
 
         origin: of their cells [m], (pieces, dim); g: velocity of the surface at their corners [m/s].
         """
@@ -122,7 +123,7 @@ def _surface(flow: forms.Coefficients, n: Any, parameters: Any, w: Any, u: Any, 
 def _moved(f: Any, n: Any, frozen: tuple[Any, Any] | None = None, parameters: Any = None) -> list[Any]:
     """f, its slope, df/dn and that by `parameters`, one after the other; frozen: a variable and its slope in f."""
     dim, found = len(n), []
-    for part in [f[i] for i in range(len(f))] if f.ufl_shape else [f]:
+    for part in _components(f):
         along = [ufl.grad(part)[j] for j in range(dim)]
         if frozen is not None:
             along = [of_f - ufl.dot(ufl.diff(part, frozen[0]), frozen[1][:, j]) for j, of_f in enumerate(along)]
@@ -130,6 +131,19 @@ def _moved(f: Any, n: Any, frozen: tuple[Any, Any] | None = None, parameters: An
         if parameters is not None:
             found[-1] += [ufl.diff(part, parameters)[k] for k in range(PARAMETERS - 1)]
     return [value for values in zip(*found, strict=True) for value in values]
+
+
+def _components(f: Any) -> list[Any]:
+    return [f[i] for i in range(len(f))] if f.ufl_shape else [f]
+
+
+def _by_penalty(f: Any, parameters: Any) -> list[Any]:
+    """df/ds; D = 1 / (1 / c + s) in each direction changes, too."""
+    found = []
+    for part in _components(f):
+        by = ufl.diff(part, parameters)
+        found.append(by[0] - parameters[3] ** 2 * by[3] - parameters[4] ** 2 * by[4])
+    return found
 
 
 def _symbols(domain: fem.Domain, *shapes: tuple[int, ...]) -> tuple[Any, list[Any]]:
