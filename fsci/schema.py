@@ -30,7 +30,7 @@ length, mass and time.
 """
 
 #: settings of every mesh, listed after its own
-COMMON = ("order", "cell", "mirror", "rotate", "translate")
+COMMON = ("order", "cell", "surfaces", "mirror", "rotate", "translate")
 
 
 def json_schema() -> str:

@@ -113,6 +113,8 @@ class _Reader:
             raise self.fail(node, f"the case has more than {MOST_VALUES} values up to here; put tables into files")
         if isinstance(node, ScalarNode):
             quoted = node.style in ("'", '"')
+            if not quoted and self.open and self.open[-1].flow_style and node.value.count("(") > node.value.count(")"):
+                raise self.fail(node, f"'{node.value}' ends at ',': put a formula with ',' in quotes")
             begin = node.start_mark.index + quoted
             if self.text[begin : begin + len(node.value)] == node.value and "\n" not in node.value:
                 self.parsed.texts[keys] = Place(place.source, place.line, place.column + quoted)

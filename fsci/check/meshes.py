@@ -170,8 +170,8 @@ def _own_laws(case: Case, found: Findings) -> None:
         at_rest = mesh and found.attempt(partial(own_law_at_rest, case, name, mesh.points[mesh.cells].mean(axis=1).T))
         if at_rest and at_rest.stress > STRESS_OF_ROUNDING * (at_rest.mu + at_rest.bulk):
             place = case.place("structure", "bodies", name, "material", "law")
-            words = f"a stress of {at_rest.stress:.4g} Pa in the undeformed body '{name}'"
-            found.warnings.append(f"{place}: '{body.material.function}' gives {words}")
+            words = f"a stress of {at_rest.stress:.4g} [stress] in the undeformed body '{name}'"
+            found.warnings.append(case.worded(f"{place}: '{body.material.function}' gives {words}"))
 
 
 def _elastic(case: Case, found: Findings) -> None:

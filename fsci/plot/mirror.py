@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.derived import TENSOR
-from fsci.plot.render import import_pyvista, is_obstacle
+from fsci.plot.render import import_pyvista
+from fsci.plot.render_flow import is_flat
 from fsci.running.output import Series
 
 AXES = "xyz"
@@ -41,19 +42,25 @@ class Mirror:
     planes: Sequence[Plane]
     folder: Path
 
-    def whole(self, series: Series) -> Series:
-        """The VTU files of a part with their reflections; raises ValueError if a part is on both sides of a plane.
+    def whole(self, parts: Sequence[Series]) -> list[Series]:
+        """The VTU files of all parts with their reflections; raises ValueError if a part is on both sides of a plane.
 
-        An obstacle may be: it is whole as it is.
+        Surfaces of rigid bodies and obstacles may be: what of them is on the side that was computed counts.
         """
         if not self.planes:
-            return series
+            return list(parts)
+        meshes = [import_pyvista().read(series[0][1]) for series in parts]
+        sides = [computed_side(meshes, plane) for plane in self.planes]
+        return [self._whole(series, sides) for series in parts]
+
+    def _whole(self, series: Series, sides: Sequence[float]) -> Series:
         folder = Path(tempfile.mkdtemp(dir=self.folder))
         for _, file in series:
             mesh = import_pyvista().read(file)
-            for plane in self.planes:
-                if not (is_obstacle(mesh) and crosses(mesh, plane)):
-                    mesh = with_reflection(mesh, plane)
+            for plane, side in zip(self.planes, sides, strict=True):
+                if is_surface(mesh) and crosses(mesh, plane):
+                    mesh = one_side(mesh, plane, side)
+                mesh = with_reflection(mesh, plane)
             mesh.save(folder / file.name)
         return [(time, folder / file.name) for time, file in series]
 
@@ -81,6 +88,24 @@ def crosses(mesh: Any, plane: Plane) -> bool:
     """Whether a mesh is on both sides of a plane."""
     low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
     return bool(min(high - plane.at, plane.at - low) > BEYOND_PLANE * mesh.length)
+
+
+def computed_side(meshes: Sequence[Any], plane: Plane) -> float:
+    """1 if the largest part that is not across a plane, or of all if each is, reaches further above it; else -1."""
+    there = [mesh for mesh in meshes if not crosses(mesh, plane)] or meshes
+    low, high = max(there, key=lambda mesh: mesh.length).bounds[2 * plane.axis : 2 * plane.axis + 2]
+    return 1.0 if high - plane.at >= plane.at - low else -1.0
+
+
+def is_surface(mesh: Any) -> bool:
+    """Whether a mesh is the surface of a rigid body or obstacle: triangles in space, or lines."""
+    return bool(mesh.get_cell(0).dimension < 3 - is_flat(mesh))
+
+
+def one_side(mesh: Any, plane: Plane, side: float) -> Any:
+    """The part of a surface above a plane, or below it if `side` is -1; of lines, or of triangles."""
+    origin = np.where(np.arange(3) == plane.axis, plane.at, 0.0)
+    return mesh.clip(AXES[plane.axis], origin=origin, invert=side < 0.0).triangulate()
 
 
 def reflection(mesh: Any, plane: Plane) -> Any:

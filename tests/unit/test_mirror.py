@@ -48,14 +48,36 @@ def test_files_of_a_series(tmp_path):
         file = tmp_path / str(number) / "block_000003.vtu"
         file.parent.mkdir()
         block(high=(high, 2.0, 1.0)).save(file)
-        found += mirror.whole([(0.5, file)])
+        found += mirror.whole([[(0.5, file)]])[0]
     assert [time for time, _ in found] == [0.5, 0.5]
     assert [import_pyvista().read(file).volume for _, file in found] == pytest.approx([4.0, 12.0])
 
 
 def test_without_planes_files_are_those_of_the_run(tmp_path):
     series = [(0.0, tmp_path / "block_000000.vtu")]
-    assert Mirror((), tmp_path).whole(series) is series
+    assert Mirror((), tmp_path).whole([series]) == [series]
+
+
+@pytest.mark.parametrize("computed", [1.0, -1.0])
+def test_a_rigid_body_across_the_plane(tmp_path, computed):
+    """A ball in a flow of which one side was computed, with fields of that side alone: both sides have them."""
+    pyvista = import_pyvista()
+    flow, ball = block((0, 0, 0), (4, 2.0 * computed, 4)), pyvista.Sphere(radius=0.7, center=(2, -0.3 * computed, 2))
+    ball.point_data["traction"] = np.where(ball.points[:, 1:2] * computed >= 0, ball.points, 7e9)
+    files = [tmp_path / "flow.vtu", tmp_path / "ball.vtu"]
+    for mesh, file in zip((flow, ball), files, strict=True):
+        mesh.cast_to_unstructured_grid().save(file)
+    folder = tmp_path / "whole"
+    folder.mkdir()
+    (_, file), (_, drawn) = (part[0] for part in Mirror([Plane(1, 0.0)], folder).whole([[(0.0, f)] for f in files]))
+    assert pyvista.read(file).bounds[2:4] == pytest.approx([-2, 2])
+    drawn = pyvista.read(drawn)
+    assert set(drawn.celltypes) == {5}
+    assert drawn.bounds[2:4] == pytest.approx([-0.4, 0.4], abs=5e-3)
+    surface = drawn.extract_surface(algorithm="dataset_surface")
+    assert surface.n_open_edges == 0
+    away = np.abs(drawn.points[:, 1]) > 0.05
+    np.testing.assert_allclose(drawn.point_data["traction"][away], drawn.points[away], atol=1e-6)
 
 
 @pytest.mark.parametrize(("text", "plane"), [("y=0", Plane(1, 0.0)), (" z = -1.5", Plane(2, -1.5))])
