@@ -124,8 +124,8 @@ class InterfaceSentinel:
         if self._missed > max(SHARE_LOST * self._impulse, self._unsolved):
             message = (
                 "the forces of the fluid on the bodies differ from its balance of momentum by "
-                f"{balance.momentum:.3g} [force], {self._missed:.3g} of {self._impulse:.3g} [impulse] so far: forces are "
-                "not reliable. Take a smaller tolerance of Newton's method, or finer cells"
+                f"{balance.momentum:.3g} [force], {self._missed:.3g} of {self._impulse:.3g} [impulse] so far: forces "
+                "are not reliable. Take a smaller tolerance of Newton's method, or finer cells"
             )
             found.append(Finding("momentum", "fluid", balance.momentum, message))
         return found
