@@ -85,7 +85,7 @@ def plot_history(
     time, below = history["time"], label("time", "time", units)
     drawn = []
     for family, columns in families.items():
-        quantity = quantities.get(family, family)
+        quantity = quantities.get(family, "place" if family.endswith(".place") else family)
         text = quantity if quantity == family else f"{quantity} of {family}"
         if len(columns) == 1 and family not in quantities:
             text, quantity = OWN_COLUMNS.get(columns[0], (columns[0].replace(".", " "), quantity))

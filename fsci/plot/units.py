@@ -27,11 +27,12 @@ POWERS: dict[str, Powers] = {
     **dict.fromkeys(("contact_pressure", "contact_traction", "traction", "wall_shear_stress"), OF_STRESS),
     **dict.fromkeys(("vorticity", "strain_rate"), (0, 0, -1)),
     "q_criterion": (0, 0, -2),
-    "contact_gap": (1, 0, 0),
+    **dict.fromkeys(("contact_gap", "place"), (1, 0, 0)),
 }
 #: Quantities that do not grow with the depth; all others are per depth in 2D.
-INTENSIVE = ("displacement", "velocity", "acceleration", "gap", "mean_gap", "overlap", "pressure", "mean_pressure",
-             "outlet_pressure", "first_contact", "centre", "drag_coefficient", "lift_coefficient")  # fmt: skip
+INTENSIVE = ("displacement", "velocity", "speed", "acceleration", "gap", "mean_gap", "overlap", "pressure",
+             "mean_pressure", "outlet_pressure", "first_contact", "centre", "drag_coefficient",
+             "lift_coefficient")  # fmt: skip
 
 SIZES = {**LENGTHS, **MASSES, **UNITS_OF_TIME}  #: in m, kg and s
 #: powers -> names of units with their size in m, kg and s, in increasing order

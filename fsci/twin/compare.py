@@ -42,7 +42,9 @@ class TwinChange:
 def units(case: Case) -> dict[str, tuple[int, int, int]]:
     """By column of a probe: the powers of length, mass and time in its unit."""
     dimension = case.dimension or 3
-    return {name: probe.measured.powers for key, probe in case.probes.items() for name in probe.columns(key, dimension)}
+    return {
+        name: probe.powers(key, name) for key, probe in case.probes.items() for name in probe.columns(key, dimension)
+    }
 
 
 def values(
