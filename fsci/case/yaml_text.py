@@ -7,7 +7,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode
 
 from fsci.case.errors import CaseError, Place, Problem
 
@@ -91,7 +91,7 @@ class _Reader:
     def __init__(self, text: str, source: str):
         self.text, self.source = text, source
         self.parsed = Parsed()
-        self.open: list[Node] = []  # sections and lists around the current node
+        self.open: list[CollectionNode] = []  # sections and lists around the current node
         self.count = 0  # values read so far
 
     def error(self, line: int, column: int, message: str) -> CaseError:

@@ -83,9 +83,14 @@ def unit_of(quantity: str, units: Mapping[str, str], largest: float = 0.0, *, fl
     return replace(unit, text=unit.text.replace("J", "N m")) if quantity == "moment" else unit
 
 
-def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
+def label(text: str, quantity: str, units: Mapping[str, str], *, flat: bool = False) -> str:
     """A text for matplotlib with the unit that a quantity has in the case, or without for unknown quantities."""
-    return unit_of(quantity, units).beside(text)
+    return unit_of(quantity, units, flat=flat).beside(text)
+
+
+def measured(family: str, quantities: Mapping[str, str], otherwise: str = "") -> str:
+    """The quantity of the columns FAMILY.x, ... of a probe, or of the place that it has; `otherwise` of no probe."""
+    return quantities.get(family, "place" if family.endswith(".place") else otherwise)
 
 
 def _of_case(whole: Powers, depth: int, names: tuple[str, str, str]) -> str:
