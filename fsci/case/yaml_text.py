@@ -123,6 +123,7 @@ class _Reader:
             raise self.fail(node, "this section contains itself")
         if _short(node.tag) not in ("!!map", "!!seq"):
             raise self.fail(node, f"the tag '{_short(node.tag)}' is not allowed in a case file")
+        assert isinstance(node, CollectionNode)
         self.open.append(node)
         if isinstance(node, MappingNode):
             data: Any = self.section(node, keys)

@@ -103,6 +103,24 @@ def test_least_speed_between_points(element):
     assert box_extreme(fluid, "speed", "least")()[""] > 0.1 * np.linalg.svd(SLOPES[:2, :2])[1].min()
 
 
+@ELEMENTS
+@pytest.mark.parametrize(("points", "candidates"), [(3, 32), (9, 32), (5, 8), (5, 128)])
+def test_points_in_cells_do_not_matter(element, points, candidates, monkeypatch):
+    """Vortices around a heptagon: the speed between nodes is that of the finest lattice around the best point."""
+    fluid = fluid_of(
+        uniform([0, 0], [1, 1], [9, 7]), [body("heptagon", circle((0.52, 0.47), 0.13, 7), loop(7))], element, 0
+    )
+    x, y = np.pi * fluid.unknowns.velocity.points.T * 2.3
+    fluid.flow[fluid.unknowns.velocity.dofs] = np.stack(
+        [np.sin(x) * np.cos(y) + 0.2, -np.cos(x) * np.sin(1.1 * y)], axis=1
+    )
+    found = [box_extreme(fluid, "speed", "largest", low, [0.9, 0.8])() for low in ([0.05, 0.1], [0.31, 0.2])]
+    monkeypatch.setattr("solvers.fluid.flow.box_extremes.LATTICE", points)
+    monkeypatch.setattr("solvers.fluid.flow.box_extremes.CANDIDATES", candidates)
+    for one, low in zip(found, ([0.05, 0.1], [0.31, 0.2]), strict=True):
+        assert box_extreme(fluid, "speed", "largest", low, [0.9, 0.8])() == pytest.approx(one, rel=1e-6)
+
+
 def test_without_fluid():
     points, facets = block([0.2, 0.2], [0.8, 0.8])
     fluid = fluid_of(uniform([0, 0], [1, 1], [5, 5]), [body("block", points, facets)], "q1q1", [0.0, 0.0])

@@ -5,9 +5,8 @@ The flow is evaluated at
 - a lattice in each cell, or in its part in the box; in cut cells at points in the fluid,
 - the corners of the parts of facets that are in a cell and in the box.
 
-Linear fields are largest and least at such points. The pressure is linear along each axis of a cell, hence so is what
-is largest of it without surfaces. Around the best point ever finer lattices follow, because a speed may be largest
-between points.
+Linear fields are largest and least at such points. So is the pressure in cells without surface: it is linear along
+each of their axes. Around the best points ever finer lattices follow, because a speed may be largest between points.
 """
 
 from __future__ import annotations
@@ -20,17 +19,19 @@ import numpy as np
 
 from solvers import fem
 from solvers.api import Array, Indices
+from solvers.fluid.flow.box_probes import MOST_CELLS_IN_BATCH
 from solvers.fluid.flow.extreme_pressure import clipped
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.section import cell_bounds
 from solvers.fluid.surfaces.inside import INSIDE, windings
 
-#: Points of the lattice along each edge of a cell. With 3 or 9, results differ by less than their error.
-LATTICE = 5
-#: Finer lattices around the best point, each of half the size: the last one is of a millionth of a cell.
+#: Points of the lattice along each edge of a cell, and cells without surface with the best ones, around which finer
+#: lattices follow. 3 or 9, and 8 or 128 find the same extremes of vortices (a test).
+LATTICE, CANDIDATES = 5, 32
+#: Finer lattices around a point, each of half the size: the last one is of a millionth of a cell.
 HALVINGS = 20
-#: Cells that are evaluated together, and points that are looked for in bodies together; both limit memory.
-MOST_CELLS_IN_BATCH, MOST_POINTS_IN_BATCH = 10_000, 256
+#: Points that are looked for in bodies together, from the best one on, which mostly is in the fluid.
+MOST_POINTS_IN_BATCH = 256
 #: Largest value of a shape function's sum of absolute values along one axis, by degree: of 1 and of 2 (Lebesgue).
 LEBESGUE = {1: 1.0, 2: 1.25}
 
@@ -50,13 +51,14 @@ class Best:
 
 def box_extreme(
     fluid: Fluid,
-    quantity: Literal["speed", "pressure"],
+    quantity: str,
     extreme: Literal["largest", "least"],
     low: Sequence[float] | None = None,
     high: Sequence[float] | None = None,
 ) -> Callable[[], dict[str, float]]:
-    """Probe of the largest or least speed [m/s] or pressure [Pa] between two corners [m], or of all fluid (collective).
+    """Probe of the largest or least `speed` [m/s] or `pressure` [Pa] between two corners [m], or of all fluid.
 
+    Calls are collective.
     Its values are "", and the place [m] as "place.x", ...; nan where there is no fluid.
     """
     edges = fluid.grid.grid.edges
@@ -72,7 +74,6 @@ def box_extreme(
         if fluid.bodies:
             _on_surfaces(fluid, values, parts, best)
         if best.cell >= 0:
-            _refine(fluid, values, parts, best)
             lowest, highest = (corner[best.cell] for corner in cell_bounds(fluid))
             place = lowest + best.at * (highest - lowest)
         else:
@@ -129,6 +130,8 @@ class _PartsOfCells:
         self.last = (np.minimum(high, box[1]) - low) / size
         inside = (self.first < self.last).all(axis=1) & (np.arange(len(low)) < fluid.grid.owned)
         self.inside = inside
+        unit = np.meshgrid(*[[-1.0, 0.0, 1.0]] * fluid.dim, indexing="ij")
+        self.around = np.stack(unit, axis=-1).reshape(-1, fluid.dim)  #: directions of a finer lattice, and none
         self.uncut = fluid.cut.uncut[inside[fluid.cut.uncut]]
         self.cut = fluid.cut.cut[inside[fluid.cut.cut]]
 
@@ -146,23 +149,41 @@ def _at_lattice(fluid: Fluid, values: _Values, parts: _PartsOfCells, best: Best)
         cells = parts.uncut[start : start + MOST_CELLS_IN_BATCH]
         points = parts.lattice(cells, values.points)
         found = values.at(cells, points)
-        row, column = np.unravel_index(found.argmax(), found.shape)
-        best.take(found[row, column], cells[row], points[row, column])
+        rows, columns = np.argsort(-found.max(axis=1), kind="stable")[:CANDIDATES], found.argmax(axis=1)
+        _refine(fluid, values, parts, cells[rows], points[rows, columns[rows]], best, cut=False)
     cells = parts.cut[values.bound(parts.cut) > best.value]
     if not len(cells):
         return
     points = parts.lattice(cells, LATTICE)
     found = values.at(cells, points)
-    rows, columns = np.nonzero(found > best.value)
-    order = np.argsort(-found[rows, columns], kind="stable")
-    for start in range(0, len(order), MOST_POINTS_IN_BATCH):
-        some = order[start : start + MOST_POINTS_IN_BATCH]
-        at = points[rows[some], columns[some]]
-        wet = np.flatnonzero(_in_fluid(fluid, cells[rows[some]], at))
+    rows, columns = np.unravel_index(np.argsort(-found, axis=None, kind="stable"), found.shape)
+    for start in range(0, len(rows), MOST_POINTS_IN_BATCH):
+        row, column = rows[start : start + MOST_POINTS_IN_BATCH], columns[start : start + MOST_POINTS_IN_BATCH]
+        wet = np.flatnonzero(_in_fluid(fluid, cells[row], points[row, column]))
         if len(wet):
-            first = some[wet[0]]
-            best.take(found[rows[first], columns[first]], cells[rows[first]], points[rows[first], columns[first]])
+            _, firsts = np.unique(row[wet], return_index=True)  # the best one of each cell
+            some = wet[np.sort(firsts)[:CANDIDATES]]
+            _refine(fluid, values, parts, cells[row[some]], points[row[some], column[some]], best, cut=True)
             return
+
+
+def _refine(
+    fluid: Fluid, values: _Values, parts: _PartsOfCells, cells: Indices, at: Array, best: Best, *, cut: bool
+) -> None:
+    """Finer lattices around a point (n, dim) of each of some cells, cut ones or not; the best one is taken."""
+    first, last = parts.first[cells], parts.last[cells]
+    now, size = values.at(cells, at[:, None])[:, 0], (last - first) / (LATTICE - 1)
+    for _ in range(HALVINGS):
+        size = 0.5 * size
+        points = np.clip(at[:, None] + size[:, None] * parts.around, first[:, None], last[:, None])
+        found = values.at(cells, points)
+        which = found.argmax(axis=1)[:, None]
+        point, value = np.take_along_axis(points, which[:, :, None], 1)[:, 0], np.take_along_axis(found, which, 1)[:, 0]
+        better = np.flatnonzero(value > now)
+        if cut:
+            better = better[_in_fluid(fluid, cells[better], point[better])]
+        at[better], now[better] = point[better], value[better]
+    best.take(now.max(), cells[now.argmax()], at[now.argmax()])
 
 
 def _in_fluid(fluid: Fluid, cells: Indices, reference: Array) -> np.ndarray:
@@ -193,21 +214,5 @@ def _on_surfaces(fluid: Fluid, values: _Values, parts: _PartsOfCells, best: Best
         if len(corners):
             found = values.at(np.array([cell]), corners[None])[0]
             which = int(found.argmax())
-            best.take(found[which], cell, corners[which])
-
-
-def _refine(fluid: Fluid, values: _Values, parts: _PartsOfCells, best: Best) -> None:
-    """Finer lattices around the best point, in its cell and in the fluid."""
-    cell = np.array([best.cell])
-    first, last = parts.first[best.cell], parts.last[best.cell]
-    cut = best.cell in parts.cut
-    unit = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * fluid.dim, indexing="ij"), axis=-1).reshape(-1, fluid.dim)
-    size = (last - first) / (values.points - 1)
-    for _ in range(HALVINGS):
-        size = 0.5 * size
-        points = np.clip(best.at + size * unit, first, last)
-        found = values.at(cell, points[None])[0]
-        for which in np.argsort(-found)[: np.count_nonzero(found > best.value)]:
-            if not cut or _in_fluid(fluid, cell, points[[which]])[0]:
-                best.take(found[which], best.cell, points[which])
-                break
+            if found[which] > best.value:
+                _refine(fluid, values, parts, np.array([cell]), corners[[which]], best, cut=True)
