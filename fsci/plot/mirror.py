@@ -20,6 +20,7 @@ from fsci.plot.render_flow import is_flat
 from fsci.running.output import Series
 
 AXES = "xyz"
+JOINED = 1e-9  #: distance relative to the size of a mesh within which nodes are one
 BEYOND_PLANE = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane
 
 
@@ -47,7 +48,7 @@ class Mirror:
 
         Surfaces of rigid bodies and obstacles may be: what of them is on the side that was computed counts.
         """
-        if not self.planes:
+        if not self.planes or not parts:
             return list(parts)
         meshes = [import_pyvista().read(series[0][1]) for series in parts]
         sides = [computed_side(meshes, plane) for plane in self.planes]
@@ -81,7 +82,7 @@ def with_reflection(mesh: Any, plane: Plane) -> Any:
     if crosses(mesh, plane):
         low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
         raise ValueError(f"a part lies on both sides of {plane.name}, from {low:.6g} to {high:.6g}")
-    return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=1e-9 * mesh.length)
+    return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=JOINED * mesh.length)
 
 
 def crosses(mesh: Any, plane: Plane) -> bool:
@@ -105,7 +106,14 @@ def is_surface(mesh: Any) -> bool:
 def one_side(mesh: Any, plane: Plane, side: float) -> Any:
     """The part of a surface above a plane, or below it if `side` is -1; of lines, or of triangles."""
     origin = np.where(np.arange(3) == plane.axis, plane.at, 0.0)
-    return mesh.clip(AXES[plane.axis], origin=origin, invert=side < 0.0).triangulate()
+    found = mesh.clip(AXES[plane.axis], origin=origin, invert=side < 0.0).triangulate()
+    sizes = found.compute_cell_sizes(length=True, area=True, volume=False).cell_data
+    extended = sizes["Length"] + np.sqrt(sizes["Area"]) > JOINED * mesh.length
+    found = found.extract_cells(extended)  # those that a cut through a corner leaves are points
+    for data in (found.point_data, found.cell_data):
+        for name in [name for name in data.keys() if name.startswith("vtkOriginal")]:
+            del data[name]
+    return found
 
 
 def reflection(mesh: Any, plane: Plane) -> Any:
@@ -120,6 +128,9 @@ def reflection(mesh: Any, plane: Plane) -> Any:
     reflect.FlipAllInputArraysOff()
     reflect.Update()
     found = import_pyvista().wrap(reflect.GetOutput())
+    points = np.array(mesh.points, dtype=float)  # those of the filter are in single precision
+    points[:, plane.axis] = 2.0 * plane.at - points[:, plane.axis]
+    found.points = points
     for data in (found.point_data, found.cell_data):
         for name in data.keys():
             values, component = data[name], name.rpartition("_")[2]
