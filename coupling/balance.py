@@ -116,7 +116,7 @@ class InterfaceSentinel:
         exchanged = max(self._passed, self._solid.exchanged())
         if not self._steady and balance.work - last > SHARE_LOST * exchanged:
             message = (
-                f"at the surfaces in the fluid {balance.work:.3g} J were made of nothing, "
+                f"at the surfaces in the fluid {balance.work:.3g} [energy] were made of nothing, "
                 f"{balance.work / exchanged:.0%} of the energy that the scene has exchanged: the step "
                 "does not resolve how they move; take a smaller 'step', or 'scheme: bdf2' with smooth starts"
             )
@@ -124,8 +124,8 @@ class InterfaceSentinel:
         if self._missed > max(SHARE_LOST * self._impulse, self._unsolved):
             message = (
                 "the forces of the fluid on the bodies differ from its balance of momentum by "
-                f"{balance.momentum:.3g} N, {self._missed:.3g} of {self._impulse:.3g} N s so far: forces are not "
-                "reliable. Take a smaller tolerance of Newton's method, or finer cells"
+                f"{balance.momentum:.3g} [force], {self._missed:.3g} of {self._impulse:.3g} [impulse] so far: forces "
+                "are not reliable. Take a smaller tolerance of Newton's method, or finer cells"
             )
             found.append(Finding("momentum", "fluid", balance.momentum, message))
         return found

@@ -144,7 +144,7 @@ class NearWalls:
         if passed:
             self._needed += [pair.name for pair, _ in passed]
             pair, depth = passed[0]
-            reason = f"{pair.pair.slave.body} has come {depth:.3g} m behind {pair.wall} in one step"
+            reason = f"{pair.pair.slave.body} has come {depth:.3g} [length] behind {pair.wall} in one step"
             raise WallPassed(self._structure.name, FailureKind.NOT_HELD, reason)
 
     def _at_slaves(self, owned: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 from fsci.case import Case, load_case
 from fsci.case.settings import differences, dotted, in_words, settings_of
 from fsci.plot.lines import plot_lines
-from fsci.plot.units import label
+from fsci.plot.units import label, measured
 from fsci.running.history import History
 from fsci.running.kept_case import copies
 from fsci.running.results import read_results
@@ -117,7 +117,9 @@ def _draw(runs: Sequence[Kept], out: Path) -> Iterator[Path]:
             columns = families.setdefault(name.rpartition(".")[0] or name, [])
             if name not in columns:
                 columns.append(name)
-    units = runs[0].case.units.model_dump()
+    case = runs[0].case
+    units, flat = case.units.model_dump(), case.dimension == 2
+    quantities = {name: probe.quantity for name, probe in case.probes.items()}
     for family, columns in families.items():
         curves = {
             column: {run.name: (run.history["time"], run.history[column]) for run in runs if column in run.history}
@@ -125,8 +127,6 @@ def _draw(runs: Sequence[Kept], out: Path) -> Iterator[Path]:
         }
         if any(len(times) > 1 for lines in curves.values() for times, _ in lines.values()):
             out.mkdir(parents=True, exist_ok=True)
-            probe = runs[0].case.probes.get(family)
-            named = {
-                label(column, "" if probe is None else probe.quantity, units): curves[column] for column in columns
-            }
+            quantity = measured(family, quantities)
+            named = {label(column, quantity, units, flat=flat): curves[column] for column in columns}
             yield plot_lines(out / f"diff_{family}.png", named, label("time", "time", units))

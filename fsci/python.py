@@ -43,7 +43,7 @@ class Steps:
         self.case = case
         timer = Timer()
         self._simulation = build(case, self._comm, timer)
-        self._scheme = Watched(self._simulation.scheme, self._simulation.sentinels, timer)
+        self._scheme = Watched(self._simulation.scheme, self._simulation.sentinels, timer, case.worded)
         self._clock = clock_of(case)
         initialise(case, self._simulation, self._scheme, self._clock.nominal)
         self.info: StepInfo | None = None  #: of the last step: iterations, residuals, what sentinels found

@@ -22,7 +22,8 @@ length, mass and time.
 - An *expression* may contain variables too, x, y, z being reference coordinates and t the time. There are the operators
   `+ - * / ** ^`, comparisons, `and`, `or`, `not`, the constants `pi` and `e`, and the functions {functions}.
   `where(condition, a, b)` is a where the condition holds, else b; `ramp(t, a, b)` rises from 0 at a to 1 at b, its
-  first two derivatives being zero at both ends. The functions of the section `curves` belong to them.
+  first two derivatives being zero at both ends. The functions of the section `curves` belong to them. YAML needs quotes
+  around an expression that begins with `*`, or has a comma within brackets: `[0, "min(t, 1)"]`.
 - A *name* has letters, digits, `_` and `-`.
 - `include: FILE` in a section stands for the settings in another YAML file, or for its list. Settings beside it win.
   Names of files in either file count from the folder of the file that is the case.
@@ -30,7 +31,7 @@ length, mass and time.
 """
 
 #: settings of every mesh, listed after its own
-COMMON = ("order", "cell", "mirror", "rotate", "translate")
+COMMON = ("order", "cell", "surfaces", "mirror", "rotate", "translate")
 
 
 def json_schema() -> str:

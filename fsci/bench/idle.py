@@ -85,7 +85,7 @@ def _simulation(
     timer = ProcessorTimer()
     case = load_case(folder, [(name, json.dumps(value)) for name, value in settings.items()])
     simulation = build(case, MPI.COMM_WORLD, timer)
-    scheme = Watched(simulation.scheme, simulation.sentinels if watched else {}, timer)
+    scheme = Watched(simulation.scheme, simulation.sentinels if watched else {}, timer, case.worded)
     simulation.initialise(0.0, case.time.step)
     scheme.start(0.0)
     return simulation, scheme, timer, case.time.step

@@ -22,6 +22,7 @@ from fsci.meshes.nested import following, read_grid
 from fsci.meshes.of_case import read_rigid_body, require_shorter_than_period
 from solvers.api import StepFailed
 from solvers.fluid.flow import probes
+from solvers.fluid.flow.box_extremes import box_extreme
 from solvers.fluid.flow.box_probes import CrossesThinBody, box_probe
 from solvers.fluid.flow.extreme_pressure import extreme_pressure
 from solvers.fluid.flow.field import Fluid
@@ -172,6 +173,8 @@ def _through_plane(case: Case, forces: probes.Forces, name: str) -> probes.Probe
 def _in_box(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     settings = case.probes[name]
     assert settings.box is not None
+    if settings.has_place:
+        return _place_of_extreme(case, forces, name)
     try:
         return box_probe(forces.fluid, settings.quantity, *settings.box)
     except CrossesThinBody as error:
@@ -184,6 +187,12 @@ def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
 
 def _extreme(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return extreme_pressure(forces.fluid, case.probes[name].extreme or "largest")
+
+
+def _place_of_extreme(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    box = settings.box or (None, None)
+    return box_extreme(forces.fluid, settings.quantity, settings.extreme or "largest", *box)
 
 
 def _force(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
@@ -211,6 +220,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     **{(quantity, "box"): _in_box for quantity in ("velocity", "pressure", "volume", "kinetic_energy")},
     ("outlet_pressure", "through"): _of_outlet,
     ("pressure", ""): _extreme,
+    **{("speed", place): _place_of_extreme for place in ("box", "")},
     ("force", ""): _force,
     ("moment", ""): _force,
     ("power", ""): _force,

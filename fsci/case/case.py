@@ -169,6 +169,10 @@ class Case(Section):
         meshes += [surface.mesh for surface in self.rigid_surfaces.values()]
         return next((mesh.plan.dimension for mesh in meshes if isinstance(mesh, ShapeSection)), None)
 
+    def worded(self, text: str) -> str:
+        """A text of a solver with units of the case in place of [length], [volume], ..."""
+        return self.units.worded(text, self.dimension or 3)
+
     def with_places_of(self, other: Case) -> Case:
         """The same case, whose messages give positions in the file of another one of the same settings."""
         case = self.model_copy()

@@ -6,15 +6,13 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from fsci.case.section import Section, fault, setting
+from fsci.case.section import fault, setting
 from fsci.case.shapes import AnyShape, PlacedMesh
 from fsci.case.values import (
     Count,
     CountOrZero,
-    EntryCount,
     Name,
     Number,
-    NumberVector,
     Order,
     Positive,
     Text,
@@ -22,29 +20,6 @@ from fsci.case.values import (
     describe_value,
 )
 from fsci.shapes import SHAPES
-
-
-class MeshSurface(Section):
-    """A named surface of a mesh file: the facets of its boundary with this normal, in this box, or both.
-
-    Coordinates are those of the file times `scale`, before the mesh is mirrored, turned or moved.
-    """
-
-    normal: NumberVector | None = setting(None, "direction of their outward normals, of any length", unit="1")
-    within: Positive = setting(10.0, "largest angle between a normal and this one", unit="degrees")
-    box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
-        None, "lowest and highest corner of a box around all of their corners", unit="m"
-    )
-
-    @model_validator(mode="after")
-    def _some(self) -> MeshSurface:
-        if self.normal is None and self.box is None:
-            raise fault("a surface needs 'normal', 'box' or both")
-        if self.normal is not None and not any(self.normal):
-            raise fault("must not be zero", "normal")
-        if self.normal is None and "within" in self.model_fields_set:
-            raise fault("'within' belongs to 'normal'", "within")
-        return self
 
 
 class FileMesh(PlacedMesh):
@@ -78,7 +53,6 @@ class FileMesh(PlacedMesh):
         unit="m",
     )
     layers: Count = setting(1, "number of cells through the thickness")
-    surfaces: dict[Name, MeshSurface] = setting(dict, "more surfaces by name, where the file has no names")
     refine: CountOrZero = setting(
         0, "how often edges are halved, so that each cell becomes four, in 3D eight; the surface stays what it is"
     )

@@ -42,7 +42,7 @@ def axis_mistakes(axis: tuple[float, ...] | None, dimension: int | None, keys: K
 
 def surface_mistakes(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
     """Mistakes in the names of surfaces of built-in shapes."""
-    if isinstance(mesh, ShapeSection) and name not in (surfaces := mesh.plan.surfaces):
+    if isinstance(mesh, ShapeSection) and name not in (surfaces := (*mesh.plan.surfaces, *mesh.surfaces)):
         there = ", ".join(surfaces)
         hint = did_you_mean(name, surfaces)
         hint = f"{hint} (available: {there})" if hint.startswith(";") else hint

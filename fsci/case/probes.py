@@ -8,6 +8,7 @@ from pydantic import model_validator
 
 from fsci.case.quantities import FIELDS, LOCATIONS, QUANTITIES, Field, Quantity, described
 from fsci.case.section import Section, fault, setting
+from fsci.case.units import Powers
 from fsci.case.values import EntryCount, Name, NumberVector, Positive, Text
 
 #: Quantities of a pair that have no place.
@@ -81,7 +82,9 @@ column NAME. In 2D everything is per unit of depth.
     )
     pair: Name | None = setting(None, "name of a contact pair")
     extreme: Literal["largest", "least"] | None = setting(
-        None, "of all slave nodes of the pair, or of all fluid; default: the least gap, the largest pressure"
+        None,
+        "of all slave nodes of the pair, or of the fluid in a box or of all; default: the least gap, the largest "
+        "speed, the largest pressure of all fluid",
     )
     reference: Reference | None = setting(None, "reference values of drag and lift coefficients")
     about: NumberVector | None = setting(None, "point that a moment is about; default: the origin", unit="m")
@@ -129,15 +132,26 @@ column NAME. In 2D everything is per unit of depth.
         raise fault(f"quantity '{self.quantity}' {wanted}", self.place or "quantity")
 
     def _check_extreme(self) -> None:
-        of_fluid = self.quantity == "pressure" and self.place == ""
+        of_fluid = self.quantity in ("pressure", "speed") and self.place in ("", "box")
         if self.extreme is not None and self.place != "pair" and not of_fluid:
-            raise fault("'extreme' applies to the nodes of a contact pair, or to the pressure of all fluid", "extreme")
+            words = "the nodes of a contact pair, or to pressure and speed of all fluid or of that in a box"
+            raise fault(f"'extreme' applies to {words}", "extreme")
         if self.extreme is not None and self.at is not None:
             raise fault("give either 'at' or 'extreme', not both", "extreme")
         for key in ("at", "extreme"):
             if self.quantity in OF_WHOLE_PAIRS and getattr(self, key) is not None:
                 raise fault(f"'{self.quantity}' is measured on the whole pair: remove '{key}'", key)
 
+    @property
+    def has_place(self) -> bool:
+        """Whether it says where its value is."""
+        return self.quantity == "speed" or (self.place == "box" and self.extreme is not None)
+
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv that the probe called `name` fills."""
-        return self.measured.columns(name, dimension)
+        places = tuple(f"{name}.place.{axis}" for axis in "xyz"[:dimension]) if self.has_place else ()
+        return self.measured.columns(name, dimension) + places
+
+    def powers(self, name: str, column: str) -> Powers:
+        """Powers of length, mass and time of a column of the probe called `name`."""
+        return (1, 0, 0) if column.startswith(f"{name}.place.") else self.measured.powers

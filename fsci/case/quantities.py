@@ -60,6 +60,13 @@ _QUANTITIES = (
         "displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area", rigid=("at",)
     ),
     Quantity("velocity", _SPEED, "vector", ("at",), ("at", "box"), ("dynamics",), rigid=("at",)),
+    Quantity(
+        "speed",
+        _SPEED,
+        "one",
+        fluid=("box", WHOLE),
+        meaning="the `extreme`, and its place in columns NAME.place.x, NAME.place.y, ...",
+    ),
     Quantity("acceleration", (1, 0, -2), "vector", ("at",), needs=("dynamics",)),
     Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs on the bodies"),
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
@@ -127,7 +134,7 @@ def _lines(field: Field) -> Iterator[str]:
         "pair": "with `pair`, of a contact pair",
         "through": "with `through`, through a patch",
         "plane": "with `plane`, through the part of a plane, in 2D of a line, that is in the fluid",
-        "box": "with `box`, of the fluid in it, of velocity and pressure the mean",
+        "box": "with `box`, of the fluid in it, of velocity and pressure the mean (or `extreme`, with its place)",
         WHOLE: "with none of them, of the whole",
     }
     for place, beginning in words.items():

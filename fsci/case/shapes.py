@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 from pydantic import create_model, model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, EntryCount, NotNegative, Number, NumberVector, OneOrMany, Order, Positive
+from fsci.case.values import (
+    Count,
+    EntryCount,
+    Name,
+    NotNegative,
+    Number,
+    NumberVector,
+    OneOrMany,
+    Order,
+    Positive,
+)
 from fsci.shapes import SHAPES
 from fsci.shapes.declaration import MeshPlan, ShapeError, Takes, require_multiples, settings
 
@@ -27,9 +37,33 @@ class Rotation(Section):
 Rotations = Annotated[tuple[Rotation, ...], OneOrMany()]
 
 
+class MeshSurface(Section):
+    """A named surface of a mesh: the facets of its boundary with this normal, in this box, or both.
+
+    Coordinates are those of the shape, or of the file times `scale`, before the mesh is mirrored, turned or moved.
+    """
+
+    normal: NumberVector | None = setting(None, "direction of their outward normals, of any length", unit="1")
+    within: Positive = setting(10.0, "largest angle between a normal and this one", unit="degrees")
+    box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
+        None, "lowest and highest corner of a box around all of their corners", unit="m"
+    )
+
+    @model_validator(mode="after")
+    def _some(self) -> MeshSurface:
+        if self.normal is None and self.box is None:
+            raise fault("a surface needs 'normal', 'box' or both")
+        if self.normal is not None and not any(self.normal):
+            raise fault("must not be zero", "normal")
+        if self.normal is None and "within" in self.model_fields_set:
+            raise fault("'within' belongs to 'normal'", "within")
+        return self
+
+
 class PlacedMesh(Section):
     """A mesh that is mirrored, rotated, then moved."""
 
+    surfaces: dict[Name, MeshSurface] = setting(dict, "more surfaces by name, beside those that the mesh has")
     mirror: Literal["x", "y", "z"] | None = setting(
         None, "x: mirrored at the plane x = 0, before the rotations; surfaces keep their names"
     )

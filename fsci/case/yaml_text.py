@@ -7,7 +7,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode
 
 from fsci.case.errors import CaseError, Place, Problem
 
@@ -91,7 +91,7 @@ class _Reader:
     def __init__(self, text: str, source: str):
         self.text, self.source = text, source
         self.parsed = Parsed()
-        self.open: list[Node] = []  # sections and lists around the current node
+        self.open: list[CollectionNode] = []  # sections and lists around the current node
         self.count = 0  # values read so far
 
     def error(self, line: int, column: int, message: str) -> CaseError:
@@ -113,6 +113,8 @@ class _Reader:
             raise self.fail(node, f"the case has more than {MOST_VALUES} values up to here; put tables into files")
         if isinstance(node, ScalarNode):
             quoted = node.style in ("'", '"')
+            if not quoted and self.open and self.open[-1].flow_style and node.value.count("(") > node.value.count(")"):
+                raise self.fail(node, f"'{node.value}' ends at ',': put a formula with ',' in quotes")
             begin = node.start_mark.index + quoted
             if self.text[begin : begin + len(node.value)] == node.value and "\n" not in node.value:
                 self.parsed.texts[keys] = Place(place.source, place.line, place.column + quoted)
@@ -121,6 +123,7 @@ class _Reader:
             raise self.fail(node, "this section contains itself")
         if _short(node.tag) not in ("!!map", "!!seq"):
             raise self.fail(node, f"the tag '{_short(node.tag)}' is not allowed in a case file")
+        assert isinstance(node, CollectionNode)
         self.open.append(node)
         if isinstance(node, MappingNode):
             data: Any = self.section(node, keys)

@@ -140,6 +140,7 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
     if case.elastic_bodies:
         from fsci.builder.elements import choose_element
         from fsci.builder.wall_pairs import wall_pairs
+        from fsci.check.dry_facets import dry_facets
         from fsci.check.stiff_slaves import stiff_slaves
         from fsci.check.unpaired import unpaired
 
@@ -155,6 +156,7 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         meshes = {name: found.meshes[name] for name in names}
         at = case.place("structure" if case.contact is None else "contact")
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
+        found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in dry_facets(case, bodies)]
         stiff = stiff_slaves(case, found.meshes, found.pairs)  # none of those that the program finds
         found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in stiff]
 
@@ -170,8 +172,8 @@ def _own_laws(case: Case, found: Findings) -> None:
         at_rest = mesh and found.attempt(partial(own_law_at_rest, case, name, mesh.points[mesh.cells].mean(axis=1).T))
         if at_rest and at_rest.stress > STRESS_OF_ROUNDING * (at_rest.mu + at_rest.bulk):
             place = case.place("structure", "bodies", name, "material", "law")
-            words = f"a stress of {at_rest.stress:.4g} Pa in the undeformed body '{name}'"
-            found.warnings.append(f"{place}: '{body.material.function}' gives {words}")
+            words = f"a stress of {at_rest.stress:.4g} [stress] in the undeformed body '{name}'"
+            found.warnings.append(case.worded(f"{place}: '{body.material.function}' gives {words}"))
 
 
 def _elastic(case: Case, found: Findings) -> None:

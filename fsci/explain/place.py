@@ -57,7 +57,11 @@ def pairs_of(case: Case, body: str) -> list[str]:
 
 def describe(near: Nearest, case: Case) -> list[str]:
     """Lines of text on body, node, cell and fields at the position."""
-    away = "at this place" if near.distance <= WRITTEN_AS_ZERO * near.extent else f"{near.distance:.3g} m away"
+    away = (
+        "at this place"
+        if near.distance <= WRITTEN_AS_ZERO * near.extent
+        else f"{near.distance:.3g} {case.units.length} away"
+    )
     lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {away}"]
     for name, value in near.values.items():
         components = np.atleast_1d(value)

@@ -38,8 +38,9 @@ def build_mesh(settings: Any, folder: Path, *, rigid: bool = False) -> Mesh:
             sheet, order = Sheet(thickness / scale, settings.layers, order or 1), 1
         mesh = read_mesh(folder / settings.file, order, parameters, size_factor, rigid=rigid, sheet=sheet)
         mesh = replace(mesh, points=mesh.points * scale)
-        mesh = with_surfaces(mesh, getattr(settings, "surfaces", {}))
-        mesh = _refined(mesh, getattr(settings, "refine", 0))
+    mesh = with_surfaces(mesh, getattr(settings, "surfaces", {}))
+    if getattr(settings, "refine", 0):
+        mesh = _refined(mesh, settings.refine)
     if getattr(settings, "mirror", None) is not None:
         mesh = mirrored(mesh, "xyz".index(settings.mirror))
     return place(mesh, getattr(settings, "rotate", None), getattr(settings, "translate", None))

@@ -32,7 +32,7 @@ def with_surfaces(mesh: Mesh, named: Mapping[str, Any]) -> Mesh:
     found = dict(mesh.surfaces)
     for name, section in named.items():
         if name in mesh.surfaces:
-            raise MeshError(f"the file has a surface '{name}': take another name", "surfaces", name)
+            raise MeshError(f"the mesh has a surface '{name}': take another name", "surfaces", name)
         chosen = np.ones(len(x), dtype=bool)
         if section.normal is not None:
             _require_entries(mesh, section.normal, name, "normal")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.tidy import tidy
-from fsci.plot.units import Unit, label, literal, unit_of
+from fsci.plot.units import Unit, label, literal, measured, unit_of
 from fsci.running.files import replacing
 from fsci.running.history import COLUMNS, History
 
@@ -85,7 +85,7 @@ def plot_history(
     time, below = history["time"], label("time", "time", units)
     drawn = []
     for family, columns in families.items():
-        quantity = quantities.get(family, family)
+        quantity = measured(family, quantities, family)
         text = quantity if quantity == family else f"{quantity} of {family}"
         if len(columns) == 1 and family not in quantities:
             text, quantity = OWN_COLUMNS.get(columns[0], (columns[0].replace(".", " "), quantity))

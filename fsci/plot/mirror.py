@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.derived import TENSOR
-from fsci.plot.render import import_pyvista, is_obstacle
+from fsci.plot.render import import_pyvista
+from fsci.plot.render_flow import is_flat
 from fsci.running.output import Series
 
 AXES = "xyz"
+JOINED = 1e-9  #: distance relative to the size of a mesh within which nodes are one
 BEYOND_PLANE = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane
 
 
@@ -41,19 +43,25 @@ class Mirror:
     planes: Sequence[Plane]
     folder: Path
 
-    def whole(self, series: Series) -> Series:
-        """The VTU files of a part with their reflections; raises ValueError if a part is on both sides of a plane.
+    def whole(self, parts: Sequence[Series]) -> list[Series]:
+        """The VTU files of all parts with their reflections; raises ValueError if a part is on both sides of a plane.
 
-        An obstacle may be: it is whole as it is.
+        Surfaces of rigid bodies and obstacles may be: what of them is on the side that was computed counts.
         """
-        if not self.planes:
-            return series
+        if not self.planes or not parts:
+            return list(parts)
+        meshes = [import_pyvista().read(series[0][1]) for series in parts]
+        sides = [computed_side(meshes, plane) for plane in self.planes]
+        return [self._whole(series, sides) for series in parts]
+
+    def _whole(self, series: Series, sides: Sequence[float]) -> Series:
         folder = Path(tempfile.mkdtemp(dir=self.folder))
         for _, file in series:
             mesh = import_pyvista().read(file)
-            for plane in self.planes:
-                if not (is_obstacle(mesh) and crosses(mesh, plane)):
-                    mesh = with_reflection(mesh, plane)
+            for plane, side in zip(self.planes, sides, strict=True):
+                if is_surface(mesh) and crosses(mesh, plane):
+                    mesh = one_side(mesh, plane, side)
+                mesh = with_reflection(mesh, plane)
             mesh.save(folder / file.name)
         return [(time, folder / file.name) for time, file in series]
 
@@ -74,13 +82,38 @@ def with_reflection(mesh: Any, plane: Plane) -> Any:
     if crosses(mesh, plane):
         low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
         raise ValueError(f"a part lies on both sides of {plane.name}, from {low:.6g} to {high:.6g}")
-    return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=1e-9 * mesh.length)
+    return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=JOINED * mesh.length)
 
 
 def crosses(mesh: Any, plane: Plane) -> bool:
     """Whether a mesh is on both sides of a plane."""
     low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
     return bool(min(high - plane.at, plane.at - low) > BEYOND_PLANE * mesh.length)
+
+
+def computed_side(meshes: Sequence[Any], plane: Plane) -> float:
+    """1 if the largest part that is not across a plane, or of all if each is, reaches further above it; else -1."""
+    there = [mesh for mesh in meshes if not crosses(mesh, plane)] or meshes
+    low, high = max(there, key=lambda mesh: mesh.length).bounds[2 * plane.axis : 2 * plane.axis + 2]
+    return 1.0 if high - plane.at >= plane.at - low else -1.0
+
+
+def is_surface(mesh: Any) -> bool:
+    """Whether a mesh is the surface of a rigid body or obstacle: triangles in space, or lines."""
+    return bool(mesh.get_cell(0).dimension < 3 - is_flat(mesh))
+
+
+def one_side(mesh: Any, plane: Plane, side: float) -> Any:
+    """The part of a surface above a plane, or below it if `side` is -1; of lines, or of triangles."""
+    origin = np.where(np.arange(3) == plane.axis, plane.at, 0.0)
+    found = mesh.clip(AXES[plane.axis], origin=origin, invert=side < 0.0).triangulate()
+    sizes = found.compute_cell_sizes(length=True, area=True, volume=False).cell_data
+    extended = sizes["Length"] + np.sqrt(sizes["Area"]) > JOINED * mesh.length
+    found = found.extract_cells(extended)  # those that a cut through a corner leaves are points
+    for data in (found.point_data, found.cell_data):
+        for name in [name for name in data.keys() if name.startswith("vtkOriginal")]:
+            del data[name]
+    return found
 
 
 def reflection(mesh: Any, plane: Plane) -> Any:
@@ -95,6 +128,9 @@ def reflection(mesh: Any, plane: Plane) -> Any:
     reflect.FlipAllInputArraysOff()
     reflect.Update()
     found = import_pyvista().wrap(reflect.GetOutput())
+    points = np.array(mesh.points, dtype=float)  # those of the filter are in single precision
+    points[:, plane.axis] = 2.0 * plane.at - points[:, plane.axis]
+    found.points = points
     for data in (found.point_data, found.cell_data):
         for name in data.keys():
             values, component = data[name], name.rpartition("_")[2]

@@ -175,8 +175,7 @@ def read_series(folder: Path, mirror: Mirror) -> list[Series]:
         parts = unpack(packed, Path(tempfile.mkdtemp(dir=mirror.folder)))
     else:
         parts = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
-    found = [mirror.whole(series) for series in parts]
-    return sorted(found, key=lambda series: not is_flow(series[-1][1]))
+    return sorted(mirror.whole(parts), key=lambda series: not is_flow(series[-1][1]))
 
 
 def plot_state(path: Path, moment: Moment, name: str, labels: Labels) -> Path:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fsci.case.quantities import QUANTITIES
-from fsci.case.units import LENGTHS, MASSES, UNITS_OF_TIME
+from fsci.case.units import (
+    LENGTHS,
+    MASSES,
+    OF_ENERGY,
+    OF_FORCE,
+    OF_POWER,
+    OF_STRESS,
+    UNITS_OF_TIME,
+    Powers,
+    name_of_unit,
+)
 
-Powers = tuple[int, int, int]  #: of length, mass and time
-
-OF_FORCE, OF_ENERGY, OF_STRESS, OF_POWER = (1, 1, -2), (2, 1, -2), (-1, 1, -2), (2, 1, -3)
 #: powers of probes, of time and of fields
 POWERS: dict[str, Powers] = {
     **{quantity.name: quantity.powers for quantity in QUANTITIES.values()},
@@ -19,19 +27,13 @@ POWERS: dict[str, Powers] = {
     **dict.fromkeys(("contact_pressure", "contact_traction", "traction", "wall_shear_stress"), OF_STRESS),
     **dict.fromkeys(("vorticity", "strain_rate"), (0, 0, -1)),
     "q_criterion": (0, 0, -2),
-    "contact_gap": (1, 0, 0),
+    **dict.fromkeys(("contact_gap", "place"), (1, 0, 0)),
 }
 #: Quantities that do not grow with the depth; all others are per depth in 2D.
-INTENSIVE = ("displacement", "velocity", "acceleration", "gap", "mean_gap", "overlap", "pressure", "mean_pressure",
-             "outlet_pressure", "first_contact", "centre", "drag_coefficient", "lift_coefficient")  # fmt: skip
+INTENSIVE = ("displacement", "velocity", "speed", "acceleration", "gap", "mean_gap", "overlap", "pressure",
+             "mean_pressure", "outlet_pressure", "first_contact", "centre", "drag_coefficient",
+             "lift_coefficient")  # fmt: skip
 
-#: (length, mass, time) -> the names of the units of force, energy, stress and power
-DERIVED = {
-    ("m", "kg", "s"): ("N", "J", "Pa", "W"),
-    ("mm", "t", "s"): ("N", "mJ", "MPa", "mW"),
-    ("mm", "g", "ms"): ("N", "mJ", "MPa", "W"),
-    ("mm", "kg", "ms"): ("kN", "J", "GPa", "kW"),
-}
 SIZES = {**LENGTHS, **MASSES, **UNITS_OF_TIME}  #: in m, kg and s
 #: powers -> names of units with their size in m, kg and s, in increasing order
 LADDERS: dict[Powers, tuple[tuple[str, float], ...]] = {
@@ -81,25 +83,19 @@ def unit_of(quantity: str, units: Mapping[str, str], largest: float = 0.0, *, fl
     return replace(unit, text=unit.text.replace("J", "N m")) if quantity == "moment" else unit
 
 
-def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
+def label(text: str, quantity: str, units: Mapping[str, str], *, flat: bool = False) -> str:
     """A text for matplotlib with the unit that a quantity has in the case, or without for unknown quantities."""
-    return unit_of(quantity, units).beside(text)
+    return unit_of(quantity, units, flat=flat).beside(text)
+
+
+def measured(family: str, quantities: Mapping[str, str], otherwise: str = "") -> str:
+    """The quantity of the columns FAMILY.x, ... of a probe, or of the place that it has; `otherwise` of no probe."""
+    return quantities.get(family, "place" if family.endswith(".place") else otherwise)
 
 
 def _of_case(whole: Powers, depth: int, names: tuple[str, str, str]) -> str:
-    derived = dict(zip((OF_FORCE, OF_ENERGY, OF_STRESS, OF_POWER), DERIVED.get(names, ()), strict=False))
     length, mass, time = (literal(name) for name in names)
-    if whole in derived:
-        return f"{derived[whole]}/{length}" if depth else derived[whole]
-    factors = [(mass, whole[1]), (length, whole[0] - depth), (time, whole[2])]
-    above = " ".join(raised(name, power) for name, power in factors if power > 0)
-    below = " ".join(raised(name, -power) for name, power in factors if power < 0)
-    return f"{above or 1}/{below}" if below else above
-
-
-def raised(name: str, power: int) -> str:
-    """A unit to a positive power."""
-    return name if power == 1 else f"{name}$^{power}$"
+    return re.sub(r"\^(\d)", r"$^\1$", name_of_unit(whole, depth, (length, mass, time)))
 
 
 def literal(text: str) -> str:

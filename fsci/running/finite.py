@@ -12,8 +12,8 @@ from solvers.api import Finding
 def not_numbers(case: Case, numbers: Mapping[str, float]) -> list[Finding]:
     """A finding for each value that is nan or infinite.
 
-    These may be nan: probes of a pair, before it touches or where nothing is near; the flow at a point and the pressure
-    on a patch, while a body covers them; the volume of a pocket that has opened.
+    These may be nan: probes of a pair, before it touches or where nothing is near; the flow at a point or in a
+    box and the pressure on a patch, while a body covers them; the volume of a pocket that has opened.
     """
     bad = [name for name, value in numbers.items() if not math.isfinite(value)]
     return [
@@ -22,10 +22,10 @@ def not_numbers(case: Case, numbers: Mapping[str, float]) -> list[Finding]:
 
 
 def _may_be_nan(case: Case, column: str) -> bool:
-    probe = case.probes.get(column.rpartition(".")[0]) or case.probes.get(column)
+    probe = case.probes.get(column.partition(".")[0])
     if probe is None:
         return column.startswith("fluid.pocket_")
-    in_flow = probe.field == "fluid" and (probe.at is not None or probe.quantity == "pressure")
+    in_flow = probe.field == "fluid" and (probe.place in ("at", "box") or probe.quantity == "pressure")
     return probe.pair is not None or in_flow
 
 

@@ -177,7 +177,7 @@ class Run:
 
         with self.record.timer("start"):
             self.simulation = build(self.case, self.comm, self.record.timer)
-        self.scheme = Watched(self.simulation.scheme, self.simulation.sentinels, self.record.timer)
+        self.scheme = Watched(self.simulation.scheme, self.simulation.sentinels, self.record.timer, self.case.worded)
         on_first(self.comm, self._require_meshes)
         self.described = json.dumps({"settings": settings_of(self.case), "meshes": self.case.meshes})
         return self.simulation

@@ -37,6 +37,7 @@ POINTS = ("at", "minus", "about", "centre", "translate", "origin")
 LOCAL = (
     "displacement",
     "velocity",
+    "speed",
     "acceleration",
     "gap",
     "mean_gap",

@@ -8,7 +8,7 @@ from typing import Any
 
 from fsci.case import Case
 from fsci.plot.lines import Line, plot_lines
-from fsci.plot.units import label, literal
+from fsci.plot.units import label, literal, measured
 from fsci.sweep.points import Combination, Parameter, short_names
 
 SPREAD = 30.0  #: ratio of positive parameters from which their axis is logarithmic
@@ -34,18 +34,19 @@ def draw(
         ", ".join(f"{other} = {value}" for other, value in zip(others, point.values[1:], strict=True))
         for point in found
     ]
+    quantities = {name: probe.quantity for name, probe in case.probes.items()}
     families: dict[str, list[str]] = {}
     for column in columns:
         families.setdefault(column.split(" ")[0].rpartition(".")[0] or column, []).append(column)
     for family, members in families.items():
         panels: dict[str, dict[str, Line]] = {}
-        probe = case.probes.get(family)
+        quantity = measured(family, quantities)
         for column in members:
             points: dict[str, list[tuple[float, float]]] = {}
             for point, name, row in zip(found, names, rows, strict=True):
                 if row[column] is not None:
                     points.setdefault(name, []).append((at[point.values[0]], row[column]))
-            beside = label(column, "" if probe is None else probe.quantity, case.units.model_dump())
+            beside = label(column, quantity, case.units.model_dump(), flat=case.dimension == 2)
             panels[beside] = {name: _line(some) for name, some in points.items()}
         yield plot_lines(
             out / f"sweep_{family.replace(' ', '_')}.png",

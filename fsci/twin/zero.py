@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fsci.case import Case
-from fsci.plot.units import INTENSIVE, OF_FORCE, Powers
+from fsci.case.units import OF_FORCE, Powers
+from fsci.plot.units import INTENSIVE
 
 #: Difference, relative to the largest value of its unit, that rounding explains: solvers stop at the same iterate.
 ROUNDING = 1e-8
@@ -63,9 +64,10 @@ def scales(case: Case) -> CharacteristicScales:
     dimension = case.dimension or 3
     powers: dict[str, Powers] = {}
     for key, probe in case.probes.items():
-        length, mass, time = probe.measured.powers
         per_depth = int(dimension == 2 and probe.measured.name not in INTENSIVE)
-        powers |= dict.fromkeys(probe.columns(key, dimension), (length - per_depth, mass, time))
+        for name in probe.columns(key, dimension):
+            length, mass, time = probe.powers(key, name)
+            powers[name] = length - per_depth, mass, time
     if case.fluid is None:
         return CharacteristicScales(powers)
     grid = case.fluid.grid

@@ -91,7 +91,7 @@ class EnergySentinel:
         allowed = max(EXCHANGED * exchanged + energy.last, energy.doubt)
         if abs(error) <= allowed or (error < 0.0 and self._dissipates):
             return []
-        share = f"by {abs(error):.3g} J, {abs(error) / exchanged:.0%} of the energy exchanged so far"
+        share = f"by {abs(error):.3g} [energy], {abs(error) / exchanged:.0%} of the energy exchanged so far"
         if error > 0.0:
             what = f"the energy of the bodies has grown without external work, {share}"
         else:

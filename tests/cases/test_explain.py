@@ -151,6 +151,9 @@ def test_rounding_errors_are_zero(tmp_path):
     assert there[:2] == ["nearest node   7 of plate, in its cell 3, at this place", "  velocity          0.5, 0, 1e-06"]
     beside = describe(Nearest("plate", 7, 3, 3.42e-3, 1.0, values), case)
     assert beside[0] == "nearest node   7 of plate, in its cell 3, 0.00342 m away"
+    (tmp_path / "case.yaml").write_text("units: {length: mm}\n" + PLATE)
+    beside = describe(Nearest("plate", 7, 3, 3.42e-3, 1.0, values), load_case(tmp_path))
+    assert beside[0] == "nearest node   7 of plate, in its cell 3, 0.00342 mm away"
 
 
 def test_the_iterate_that_failed_is_drawn(failed):

@@ -31,6 +31,9 @@ probes:
   u: {quantity: velocity, box: [[0.13, 0.1], [0.71, 0.55]]}
   energy: {quantity: kinetic_energy, box: [[0.13, 0.1], [0.71, 0.55]]}
   volume: {quantity: volume, box: [[0.13, 0.1], [0.71, 0.55]]}
+  fastest: {quantity: speed}
+  slowest: {quantity: speed, extreme: least, box: [[0.13, 0.1], [0.71, 0.55]]}
+  highest: {quantity: pressure, extreme: largest, box: [[0.13, 0.1], [0.71, 0.55]]}
 """
 
 DISCS = """
@@ -75,6 +78,11 @@ def test_box_in_a_flow_that_speeds_up(tmp_path, processes):
     t, volume = np.array(history["time"]), 0.58 * 0.45
     assert history["u.x"] == pytest.approx(2 * t, rel=1e-7)
     assert history["u.y"] == pytest.approx(0 * t, abs=1e-7)
+    assert history["fastest"] == pytest.approx(2 * t, rel=1e-7)
+    assert history["slowest"] == pytest.approx(2 * t, rel=1e-7)
+    assert history["highest"] == pytest.approx(0 * t, abs=1e-6)
+    for name, (low, high) in (("slowest", (0.13, 0.71)), ("highest", (0.13, 0.71)), ("fastest", (0, 1))):
+        assert ((low <= history[f"{name}.place.x"]) & (history[f"{name}.place.x"] <= high)).all()
     assert history["volume"] == pytest.approx(volume + 0 * t, rel=1e-10)
     assert history["energy"] == pytest.approx(0.5 * 3 * volume * 4 * t**2, rel=1e-6)
 

@@ -6,7 +6,10 @@ import json
 import pytest
 from programs import fsci
 
-from fsci.sweep.points import Parameter, between_commas, parameters, points, short_names
+from fsci.case import load_case
+from fsci.diff import diff
+from fsci.sweep.picture import draw
+from fsci.sweep.points import Combination, Parameter, between_commas, parameters, points, short_names
 
 pytestmark = pytest.mark.usefixtures("runs_in_copies")
 
@@ -126,6 +129,24 @@ def test_diff_names_settings_files_and_changes(tmp_path):
     assert "force.csv: other content" in third
     assert ["end.x", "2e-09", "6e-09", "+66.7", "%", "66.7", "%"] in words(third)
     assert (tmp_path / "out" / "pictures" / "diff_end.png").stat().st_size > 10_000
+
+
+def test_pictures_in_a_plane_have_units_per_depth(tmp_path, monkeypatch):
+    """Of the sweep as of the differences: a force in N/mm in cases of mm, t and s."""
+    panels = {}
+    for module in ("fsci.sweep.picture", "fsci.diff"):
+        found = panels.setdefault(module, [])
+        monkeypatch.setattr(f"{module}.plot_lines", lambda path, drawn, *rest, found=found, **more: found.extend(drawn))
+    force = BAR.replace("probes: {", "probes: {force: {quantity: reaction, on: left}, ")
+    (tmp_path / "case.yaml").write_text("units: {length: mm, mass: t}\n" + force)
+    assert fsci("run", tmp_path, "-o", tmp_path / "out").returncode == 0
+    diff([tmp_path / "out", tmp_path / "out"], tmp_path / "pictures")
+    row = {"force.x": 1.0, "end.x": 2.0}
+    two = [Combination("E=1", ("1",)), Combination("E=2", ("2",))]
+    list(draw(tmp_path, load_case(tmp_path), [Parameter("E", ("1", "2"))], two, list(row), [row, row]))
+    expected = {"force.x [N/mm]", "end.x [mm]"}
+    assert panels["fsci.sweep.picture"] == ["force.x [N/mm]", "end.x [mm]"]
+    assert expected <= set(panels["fsci.diff"])
 
 
 def test_diff_of_the_same_case_and_of_no_results(tmp_path):

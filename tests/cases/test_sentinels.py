@@ -106,6 +106,7 @@ fluid:
 probes:
   q: {quantity: flow_rate, through: outlet}
   inside: {quantity: pressure, at: [0.5, 0.5]}
+  fast: {quantity: speed, box: [[0.4, 0.4], [0.6, 0.6]]}
 output: {fields_every: 0}
 """
 
@@ -124,7 +125,16 @@ def test_values_that_are_no_numbers_are_named(tmp_path, monkeypatch):
     (tmp_path / "case.yaml").write_text(CHANNEL)
     case = load_case(tmp_path, [])
     nan, inf = float("nan"), float("inf")
-    numbers = {"q": nan, "inside": nan, "fluid.mass": nan, "fluid.pocket_1": nan, "residual": 1.0, "wall": inf}
+    numbers = {
+        "q": nan,
+        "inside": nan,
+        "fast": nan,
+        "fast.place.x": nan,
+        "fluid.mass": nan,
+        "fluid.pocket_1": nan,
+        "residual": 1.0,
+        "wall": inf,
+    }
     found = not_numbers(case, numbers)
     assert [finding.body for finding in found] == ["q", "fluid.mass", "wall"]  # 'inside' may be covered by a body
     assert found[0].message == "the column 'q' of history.csv is not a number: look at what it is computed from"

@@ -44,6 +44,7 @@ probes:
   out: {quantity: flow_rate, through: upper}
   across: {quantity: flow_rate, plane: {point: [0.71, 0.3], normal: [2, 1]}}
   wake: {quantity: velocity, box: [[0.83, 0.11], [1.37, 0.52]]}
+  fastest: {quantity: speed, box: [[0.83, 0.11], [1.37, 0.52]]}
 """
 
 #: A free body with springs, and the wall that it meets.

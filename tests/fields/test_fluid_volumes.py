@@ -52,7 +52,7 @@ def test_inflow_that_cannot_leave(scheme):
     assert (found.kind, found.body) == ("mass", "fluid")
     assert found.value == pytest.approx(-0.2, rel=1e-9)
     assert found.where == pytest.approx((0.5, 0.5), abs=0.05)
-    assert "0.2 m^2 of fluid were lost around (" in found.message
+    assert "0.2 [volume] of fluid were lost around (" in found.message
     assert "This part of the fluid has no open patch" in found.message
     assert look_at(flow([inflow(), OUT, SLIP], [plate([0.93, -0.2], [1.33, 0.7])], scheme=scheme)) == []
 

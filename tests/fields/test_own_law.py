@@ -208,9 +208,17 @@ def test_mistakes_in_the_setting(tmp_path, material, message):
 
 
 def test_check_warns_of_a_stress_without_strain(tmp_path):
-    found = check_meshes(load_case(folder_of(tmp_path, "{law: 'laws.py:Pressed', parameters: {mu: 3}}"), trust=True))
+    folder = folder_of(tmp_path, "{law: 'laws.py:Pressed', parameters: {mu: 3}}")
+    found = check_meshes(load_case(folder, trust=True))
     [warning] = found.warnings
     assert warning.endswith("'Pressed' gives a stress of 3 Pa in the undeformed body 'cube'")
+    text = (folder / "case.yaml").read_text()
+    (folder / "case.yaml").write_text(f"units: {{length: mm, mass: t}}\n{text}")
+    assert (
+        check_meshes(load_case(folder, trust=True))
+        .warnings[0]
+        .endswith("a stress of 3 MPa in the undeformed body 'cube'")
+    )
     found = check_meshes(
         load_case(
             folder_of(tmp_path, "{law: 'laws.py:Yeoh', parameters: {c10: 1, c20: 1, bulk: 1e6}}", "auto"), trust=True

@@ -276,6 +276,8 @@ MISTAKES = [
         ": b",
     ),
     ("  bodies:\n", "   bodies:\n", "6:4: the indentation does not match the lines above", "bodies"),
+    ("[0, -9.81]", "[0, ramp(t, 0, 1)]", "12:20: 'ramp(t' ends at ',': put a formula with ',' in quotes", "ramp"),
+    ("[0, -9.81]", "{x: min(t, 1)}", "12:20: 'min(t' ends at ',': put a formula with ',' in quotes", "min"),
     ("title: beam", "title: @beam", "1:8: a value cannot begin with this character; put it in quotes", "@"),
     ("title: beam", "title: !!python/object 3", "1:8: the tag '!!python/object' is not allowed in a case file", "!!"),
     ("title: beam", "title: *other", "1:8: there is no section marked with '&' and this name", "*other"),

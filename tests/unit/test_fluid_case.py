@@ -188,7 +188,8 @@ MISTAKES = [
     (
         "{quantity: force}",
         "{quantity: force, extreme: least}",
-        "16:37: 'extreme' applies to the nodes of a contact pair, or to the pressure of all fluid",
+        "16:37: 'extreme' applies to the nodes of a contact pair, or to pressure and speed of all fluid or of that "
+        "in a box",
         "least",
     ),
     ("{quantity: force}", "{quantity: mass}", "16:21: quantity 'mass' needs the section 'structure'", "mass"),

@@ -1,4 +1,4 @@
-"""Surfaces of mesh files that the case names by normal and box."""
+"""Surfaces of meshes that the case names by normal and box."""
 
 from types import SimpleNamespace
 
@@ -73,7 +73,7 @@ def test_mistakes(tmp_path):
     write(tmp_path / "part.vtu", MESHES["tetra"])
     write(tmp_path / "part.inp", MESHES["tetra"], point_sets={"top": top})
     for file, section, keys, words in (
-        ("part.inp", {"normal": [0, 0, 1]}, (), r"^the file has a surface 'top': take another name"),
+        ("part.inp", {"normal": [0, 0, 1]}, (), r"^the mesh has a surface 'top': take another name"),
         ("part.vtu", {"normal": [0, 1]}, ("normal",), r"^it has 2 entries, but the mesh has 3 dimensions"),
         ("part.vtu", {"box": [[0, 0], [0, 1, 1]]}, ("box", 0), r"^it has 2 entries, but the mesh has 3 dimensions"),
         ("part.vtu", {"normal": [0, 1, 1]}, (), r"no facet of the boundary is there: the nearest normal is 45 deg"),
@@ -118,3 +118,50 @@ def test_places_of_mistakes(tmp_path, monkeypatch):
     ):
         text = CASE.replace("{normal: [0, 0, -1]}", new)
         assert message in str(refused(text, lambda case: read_body(case, "block")))
+
+
+SHAPE = """\
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    wheel:
+      mesh:
+        shape: disc
+        radius: 2
+        cells: [24, 2]
+        surfaces:
+          foot: {normal: [0, -1], within: 45}
+        rotate: {angle: 90}
+      material: {law: neo_hooke, E: 1, nu: 0.3}
+      supports: [{on: foot, displacement: [0, 0]}]
+probes:
+  foot: {quantity: reaction, on: foot}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_of_built_in_shapes():
+    """A quarter of the rim of a polygon with 24 corners, turned with the shape, beside the shape's own surfaces."""
+    wheel = read_body(load(SHAPE), "wheel")
+    assert area(wheel, "foot") == pytest.approx(6 * 2 * 2.0 * np.sin(np.pi / 24))
+    assert wheel.points[wheel.surfaces["foot"]][..., 0].min() > 2.0 * np.cos(np.pi / 4) - 1e-12
+    assert area(wheel, "outer") == pytest.approx(24 * 2 * 2.0 * np.sin(np.pi / 24))
+    scaled = read_body(load(SHAPE.replace("radius: 2", "radius: 2e-3\n        order: 2")), "wheel")
+    assert area(scaled, "foot") == pytest.approx(np.pi * 1e-3, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("on: foot}", "on: fooot}", "case.yaml:15:34: 'disc' has no surface 'fooot'; did you mean 'foot'?"),
+        ("foot: {normal", "outer: {normal", "case.yaml:10:18: the mesh has a surface 'outer': take another name"),
+        ("[0, -1], within: 45", "[0, -1, 0]", "case.yaml:10:26: it has 3 entries, but the mesh has 2 dimensions"),
+        ("normal: [0, -1], within: 45", "box: [[3, 3], [4, 4]]", "case.yaml:10:17: no facet of the boundary is there"),
+    ],
+)
+@pytest.mark.usefixtures("in_new_folder")
+def test_mistakes_in_surfaces_of_shapes(old, new, message):
+    text = SHAPE.replace(old, new)
+    if "outer" in new:
+        text = text.replace("on: foot", "on: outer")
+    assert message in str(refused(text, lambda case: read_body(case, "wheel")))

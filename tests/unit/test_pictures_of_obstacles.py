@@ -1,5 +1,7 @@
 """Obstacles are written where they are and drawn beside the bodies; pictures say what the largest pressure was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from case_mistakes import load
@@ -80,15 +82,23 @@ def test_the_largest_contact_pressure_and_its_time(tmp_path, monkeypatch):
     assert largest_pressure(((0.0, tmp_path / "fields/floor_000001.vtu"),)) == 0.0
 
 
-def test_an_obstacle_across_a_plane_of_symmetry_is_whole(tmp_path):
+@pytest.mark.parametrize(("shift", "half"), [(1.0, 1.0), (0.3, 1.7), (1.7, 0.3), (0.0, 2.0), (-0.5, 2.5)])
+@pytest.mark.parametrize("computed", [1.0, -1.0])
+def test_an_obstacle_across_a_plane_of_symmetry_has_two_sides(tmp_path, monkeypatch, shift, half, computed):
+    """Those of the side that was computed; bodies may not be across."""
+    seen = []
+    monkeypatch.setattr("fsci.plot.picture.load_state", lambda *args: seen.append(load_state(*args)) or seen[-1])
     fields = FieldWriter(tmp_path / "fields")
-    floor = outline(2.0)
-    floor.points[:, 0] -= 1.0
-    fields.write(0, 0.0, [block(), floor])
+    body, floor = block(), outline(2.0)
+    places = (body.points, floor.points - [shift, 0.0, 0.0])
+    parts = [replace(part, points=x * [computed, 1, 1]) for part, x in zip((body, floor), places, strict=True)]
+    fields.write(0, 0.0, parts)
     drawn = plot_run(tmp_path, times=(0.0,), mirrors=("x=0",))
     assert [path.name for path in drawn] == ["displacement_0.png"]
+    (part,) = [part.surface for part in seen[0] if part.aside]
+    assert part.bounds[:4] == pytest.approx([-half, half, -2.0, 0.0])
     with pytest.raises(ValueError, match="a part lies on both sides"):
-        plot_run(tmp_path, times=(0.0,), mirrors=("x=0.5",))
+        plot_run(tmp_path, times=(0.0,), mirrors=(f"x={0.5 * computed}",))
 
 
 def test_obstacles_in_a_flow_in_space_do_not_hide_it(tmp_path):

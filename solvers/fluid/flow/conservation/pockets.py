@@ -115,11 +115,11 @@ class Pockets:
         change = pocket.volume / pocket.due[0] - 1.0 if pocket.due[0] > 0.0 else 0.0
         if abs(change) <= CHANGE:
             return None
-        where, unit = self._middle(pocket), f"m^{self._fluid.dim}"
+        where = self._middle(pocket)
         place = ", ".join(f"{x:.3g}" for x in where)
         number = pocket.name.rpartition("_")[2]
         message = (
-            f"closed pocket {number} of the fluid, around ({place}), has {pocket.volume:.5g} {unit} instead of "
+            f"closed pocket {number} of the fluid, around ({place}), has {pocket.volume:.5g} [volume] instead of "
             f"{pocket.due[0]:.5g} since it closed at t = {pocket.since:.4g} ({change:+.2%}): fluid was lost or made. "
             "If rigid bodies squeeze it, give it an open patch; else take a smaller 'step' or finer cells at its walls"
         )

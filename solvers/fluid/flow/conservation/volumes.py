@@ -56,7 +56,7 @@ class Volumes:
         return list(self._findings(rates))
 
     def _findings(self, rates: FlowRates) -> Iterator[Finding]:
-        least, unit = max(LOST * self._flowed, self._unsolved), f"m^{self._fluid.dim}"
+        least = max(LOST * self._flowed, self._unsolved)
         if abs(self._made) <= least and self._exchanged <= least:
             return
         regions = self._regions.now() if self._fluid.bodies else None
@@ -68,12 +68,12 @@ class Volumes:
         if abs(self._made) > least:
             what = "made of nothing" if self._made > 0.0 else "lost"
             cause = OPENED_POCKET if regions is not None and regions.opened[worst] else CLOSED_POCKET
-            message = f"{abs(self._made):.3g} {unit} of fluid were {what}{place} ({self._share(self._made)}). {cause}"
+            message = f"{abs(self._made):.3g} [volume] of fluid were {what}{place} ({self._share(self._made)}). {cause}"
             yield Finding("mass", "fluid", self._made, message, where=where)
         elif regions is not None:
             names = self._bodies_at(regions, worst)
             message = (
-                f"{self._exchanged:.3g} {unit} of fluid have passed through {names}{place}, which is tight "
+                f"{self._exchanged:.3g} [volume] of fluid have passed through {names}{place}, which is tight "
                 f"({self._share(self._exchanged)}): the cells do not separate its two sides. Make it four cells thick"
             )
             yield Finding("leak", names, self._exchanged, message, where=where)
