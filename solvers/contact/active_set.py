@@ -27,8 +27,10 @@ class ActiveSet:
         self.alternating = 0  #: nodes whose status changed when an earlier set came back in this step; 0: none did
         self.wedged = False  #: whether one of them was stuck and slipped in turn
         self.tried = np.zeros(size, dtype=bool)  #: mask of the multipliers that were in contact in this solve
-        self.stuck = np.zeros(size, dtype=bool)  #: mask of the multipliers that stuck in this solve
+        self.stuck = np.zeros(size, dtype=bool)  #: mask of those whose slip may reverse
         self._earlier: set[bytes] = set()
+        self._reversals: set[bytes] = set()
+        self._alternates = False  # slips, in this solve
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -43,6 +45,7 @@ class ActiveSet:
     def begin_solve(self) -> None:
         """Discard the earlier sets, which other loads may have chosen."""
         self.alternating, self.wedged, self._earlier = 0, False, {self.status.tobytes()}
+        self._reversals, self._alternates = set(), False
         self.tried, self.stuck = self.active, np.zeros_like(self.stuck)
 
     def choose(self, status: Statuses) -> None:
@@ -57,7 +60,21 @@ class ActiveSet:
                 self.wedged |= bool((np.minimum(status, self.status)[status != self.status] == SLIP).any())
             self._earlier.add(chosen)
         self.status = status.copy()
-        self.tried, self.stuck = self.tried | self.active, self.stuck | (status == STICK)
+        self.tried = self.tried | self.active
+        self.stuck = self.stuck | (status == STICK) & (not self._alternates)
+
+    def begin_increment(self, reversing: NDArray[np.bool_]) -> None:
+        """Note that an increment follows the latest choice; reversing: mask of the slips against the present traction.
+
+        A node that has stuck may slip to and fro in all following iterates, with one status, where sticking would be
+        right. Once the same nodes reverse in the same set again, each node sticks whenever its slip reverses. To begin
+        like that would take an iterate for each node of a belt that comes to slide.
+        """
+        if reversing.any():
+            chosen = np.where(reversing, -self.status, self.status).tobytes()
+            if chosen in self._reversals:
+                self._alternates, self.stuck = True, np.zeros_like(self.stuck)
+            self._reversals.add(chosen)
 
     def cycle(self) -> str:
         """What cycles, for messages; empty if no earlier set of this step has come back."""

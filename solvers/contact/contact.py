@@ -19,6 +19,7 @@ from solvers.contact.directions import free_normals
 from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
+from solvers.contact.law.friction import FrictionBound, reversing
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
@@ -327,7 +328,11 @@ class Contact:
         own = np.zeros_like(self.z)
         assert self._condensation is not None, "condense comes first"
         parts, linearised, condensed = self._condensation
-        found = recover(linearised, condensed, balance, du)
+        found, reverses = recover(linearised, condensed, balance, du), np.zeros(len(own), dtype=bool)
+        for part in parts:
+            if isinstance(part.law, FrictionBound):
+                reverses[part.which] = reversing(part.law, part.point, part.status)
+        self.active_set.begin_increment(reverses)
         if parts:
             own[np.concatenate([part.which for part in parts])] = found.reshape(-1, self.dim)
         self._increment = own - np.where(self._constrained[:, None], self.z, 0.0)

@@ -101,6 +101,25 @@ def test_nodes_that_stick_and_slip_in_turn(second, wedges):
     assert active_set.cycle() == ""
 
 
+def test_nodes_that_reverse_again_in_the_same_set_may_stick():
+    """Until a new solve begins; an evaluation without an increment, as of a line search, is no second reversal."""
+    active_set, reversing = ActiveSet(2), np.array([True, False])
+    slips = np.full(2, SLIP, dtype=np.int8)
+    active_set.begin_step()
+    active_set.choose(np.full(2, STICK, dtype=np.int8))
+    for again in (False, True):
+        active_set.choose(slips)
+        active_set.choose(slips)
+        assert active_set.stuck.all()
+        active_set.begin_increment(reversing)
+        assert active_set.stuck.any() == (not again)
+    active_set.choose(np.full(2, STICK, dtype=np.int8))
+    assert not active_set.stuck.any()
+    active_set.begin_solve()
+    active_set.choose(np.full(2, STICK, dtype=np.int8))
+    assert active_set.stuck.all()
+
+
 def test_a_new_step_forgets_the_circles():
     active_set = ActiveSet(3)
     flip(active_set, 100)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from programs import fsci
@@ -166,3 +168,50 @@ def test_belt_whose_end_does_not_turn(tmp_path, cells):
         added = (0.2 * (np.pi - lifted) + q * (lifted * d + 0.5 * lifted**2)) / radius
     assert added == pytest.approx(0.6131, abs=1e-4)
     assert tension_at_the_end(tmp_path, "{bound: 0.2}", "1", cells) - 1.0 == pytest.approx(added, rel=5e-3 * 45 / cells)
+
+
+O_RING = """
+time: {step: STEP, end: 0.1}
+structure:
+  bodies:
+    ring:
+      mesh: {shape: disc, radius: 5.0e-3*S, cells: [24, 4], order: 2, translate: [SHIFT*S, 5.0e-3*S]}
+      material: {law: neo_hooke, E: 2.0e+6, nu: 0.49}
+      element: mixed
+      supports: [{at: [SHIFT*S, 5.0e-3*S], direction: [1, 0], displacement: 0}]
+contact:
+  friction: {coefficient: MU}
+  obstacles:
+    floor: {mesh: {shape: rectangle, size: [0.03*S, 5.0e-3*S], cells: [1, 1], origin: [-0.015*S, -5.0e-3*S]}, on: top}
+    lid:
+      mesh: {shape: rectangle, size: [0.03*S, 5.0e-3*S], cells: [1, 1], origin: [-0.015*S, 0.01*S]}
+      on: bottom
+      motion: [0, -2.0e-3*S*t]
+  pairs:
+    floor: {slave: {body: ring, on: outer}, master: {obstacle: floor}}
+    lid: {slave: {body: ring, on: outer}, master: {obstacle: lid}}
+output: {fields_every: 0}
+"""
+
+
+def squeezed_ring(folder, step, size, shift, friction=0.2):
+    """History of an O-ring between a floor and a lid that comes down; its nodes slip out and back, and then stick."""
+    text = re.sub(r"([-\d.e]+)\*S\b", lambda found: repr(float(found[1]) * size), O_RING.replace("SHIFT", str(shift)))
+    folder.mkdir(exist_ok=True)
+    (folder / "case.yaml").write_text(text.replace("STEP", str(step)).replace("MU", str(friction)))
+    assert run_case(load_case(folder / "case.yaml"), folder / "out") == FINISHED
+    return read_history(folder / "out" / "history.csv")
+
+
+@pytest.mark.parametrize(("step", "size", "shift"), [(0.05, 1.0, 0.0), (0.05, 1e-3, 1.7e-3), (0.025, 1.0, 0.0)])
+def test_slips_that_alternate_stick(tmp_path, step, size, shift):
+    """No step is repeated, both sides press alike, and the force is that without friction, whose strip is as wide.
+
+    Friction is second order in Hertz contact (Johnson, Contact Mechanics, 5.4): 0.07 to 0.27 % here.
+    """
+    history = squeezed_ring(tmp_path, step, size, shift)
+    assert len(history["time"]) == round(0.1 / step)
+    floor, lid = history["contact.floor.y"], -history["contact.lid.y"]
+    assert floor == pytest.approx(lid, rel=1e-6)
+    smooth = squeezed_ring(tmp_path / "smooth", step, size, shift, 0.0)["contact.floor.y"]
+    assert floor == pytest.approx(smooth, rel=5e-3)

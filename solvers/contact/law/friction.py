@@ -44,14 +44,25 @@ def trial_traction(at: Point) -> Array:
     return y - np.einsum("nd,nd->n", y, at.normals)[:, None] * at.normals
 
 
+def opposed(at: Point) -> NDArray[np.bool_]:
+    """Mask of the trial tractions that point against the present ones, shape (m,)."""
+    return np.einsum("nd,nd->n", trial_traction(at), at.z) < 0.0
+
+
+def reversing(law: FrictionBound, at: Point, status: Statuses) -> NDArray[np.bool_]:
+    """Mask of the multipliers that slip against their present traction, shape (m,)."""
+    return (status == SLIP) & opposed(at) & (law.radius(at) > 0.0)
+
+
 def friction_status(law: FrictionBound, at: Point) -> Statuses:
     """Status: contact where the trial pressure is positive, stick inside the disc.
 
-    A node whose trial traction is opposed to the present one sticks first, once in a solve: its slip could reverse in
-    every Newton iteration, and in the solution both have the same direction. Only the linearisation depends on this.
+    A node whose trial traction is opposed to the present one sticks first, once in a solve or, where slips alternate,
+    each time (`ActiveSet.begin_increment`): its slip could reverse in every Newton iteration, and in the solution both
+    have the same direction. Only the linearisation depends on this.
     """
     q, radius = trial_traction(at), law.radius(at)
-    turned = ~at.stuck & (np.einsum("nd,nd->n", q, at.z) < 0.0)
+    turned = ~at.stuck & opposed(at)
     inside = at.slip_defined & (turned | _within(q, radius)) & (radius > 0.0)
     return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
 

@@ -33,7 +33,7 @@ class Point:
     slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the tangential part is used
     slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
     shares: Array  #: of each pair in the area that was covered at the beginning of the step, shape (m, pairs)
-    stuck: NDArray[np.bool_]  #: mask of those that were chosen to stick in this solve, shape (m,)
+    stuck: NDArray[np.bool_]  #: mask of those that are not to stick because their slip reverses, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
     c_t: Array  #: complementarity parameter of the slip [Pa/m], (m,)
     touching: Array  #: gap [m] below which it is a rounding error, shape (m,)
