@@ -239,6 +239,13 @@ class Flow(Part, Protocol):
         """Whether the present cut has films that are thinner than a cell (collective)."""
         ...
 
+    def release(self) -> bool:
+        """Let go, at a solution, what it holds to end a cycle of iterates; whether its equations are others now.
+
+        It does so once in a step. What it holds again, by a cycle near the solution, belongs to the solution.
+        """
+        ...
+
     def added_product(self) -> Callable[[Array], Array] | None:
         """The part of its derivative that `linearise` lacks, as a product with its unknowns; None: nothing."""
         ...

@@ -250,6 +250,10 @@ class Fluid:
         """Whether the present cut has films that are thinner than a cell (collective)."""
         return bool(self.comm.allreduce(self.cut.film is not None, op=MPI.LOR))
 
+    def release(self) -> bool:
+        """Let parts of the fluid go that cycles of iterates join; whether the unknowns are others without them."""
+        return self.moving.release()
+
     def move(self, coupled: Mapping[str, Motion], *, with_solid: bool = False) -> None:
         """Cut the grid by the surfaces at their present positions, and set what depends on the cut (collective).
 
@@ -463,10 +467,7 @@ class Fluid:
         return self.system.interface_entries(self.iterate.held, vertices, rule.alpha, swept, improved=self._improved)
 
     def balances(self) -> tuple[Array, float, float]:
-        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method, power of patches).
-
-        Collective.
-        """
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method, of patches)."""
         if self._balances is None or self._balances.system is not self.system:
             self._balances = Balances(self.system)
         return self._balances(self.iterate.held)

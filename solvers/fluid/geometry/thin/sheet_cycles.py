@@ -14,6 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from solvers.algebra.connected import connected_parts
+from solvers.fluid.geometry.thin.sheet_nodes import Joined
 from solvers.fluid.geometry.thin.sheets import Sheets
 
 
@@ -36,14 +37,17 @@ def joined_in(cycle: Sequence[Sheets]) -> dict[int, frozenset[int]]:
     return found
 
 
-def divided_by_touching(earlier: Sequence[Sheets], now: Sheets) -> dict[int, frozenset[int]]:
-    """Facets of parts that are fewer parts in earlier sheets or now, in cells where bodies touch in one of both."""
+def divided_by_touching(before: Sheets, now: Sheets) -> dict[int, frozenset[int]]:
+    """Facets of parts that are fewer parts in other sheets, in cells where bodies touch in one of both."""
     found: dict[int, frozenset[int]] = {}
-    for sheets in earlier:
-        for cell in np.union1d(sheets.touching, now.touching).tolist():
-            parts = (some.facets_of_parts.get(cell, []) for some in (sheets, now))
-            found[cell] = found.get(cell, frozenset()) | _divided(*parts)
+    for cell in np.union1d(before.touching, now.touching).tolist():
+        found[cell] = _divided(*(some.facets_of_parts.get(cell, []) for some in (before, now)))
     return {cell: facets for cell, facets in found.items() if facets}
+
+
+def united(one: Joined, other: Joined) -> dict[int, frozenset[int]]:
+    """The facets of both, by cell."""
+    return {cell: one.get(cell, frozenset()) | other.get(cell, frozenset()) for cell in sorted({*one, *other})}
 
 
 def _divided(one: list[set[int]], other: list[set[int]]) -> frozenset[int]:
