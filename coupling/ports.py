@@ -236,7 +236,7 @@ class Flow(Part, Protocol):
         ...
 
     def has_films(self) -> bool:
-        """Whether the present cut has films that are thinner than a cell (collective)."""
+        """Whether the present cut has films thinner than a cell, or bodies touch that may leave one (collective)."""
         ...
 
     def release(self) -> bool:

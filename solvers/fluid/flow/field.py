@@ -247,8 +247,9 @@ class Fluid:
         return self.moving.outside(surfaces)
 
     def has_films(self) -> bool:
-        """Whether the present cut has films that are thinner than a cell (collective)."""
-        return bool(self.comm.allreduce(self.cut.film is not None, op=MPI.LOR))
+        """Whether the present cut has films thinner than a cell, or bodies touch that may leave one (collective)."""
+        touching = self.grid.sheets is not None and len(self.grid.sheets.touching) > 0
+        return bool(self.comm.allreduce(touching or self.cut.film is not None, op=MPI.LOR))
 
     def release(self) -> bool:
         """Let parts of the fluid go that cycles of iterates join; whether the unknowns are others without them."""
@@ -258,8 +259,7 @@ class Fluid:
         """Cut the grid by the surfaces at their present positions, and set what depends on the cut (collective).
 
         coupled: motions of the bodies that another field moves, by name; the others move as prescribed.
-        with_solid: a monolithic scheme solves the equations of these bodies too, which determine the pressure level of
-        closed pockets.
+        with_solid: the system has the equations of these bodies, too, which determine the pressure of closed pockets.
         Raises StepFailed if surfaces have moved too far in this step, or are close to coarse cells or periodic faces.
         """
         with self.timer("cut"):
