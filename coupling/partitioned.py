@@ -107,7 +107,11 @@ class Partitioned:
             residual = max(_mean((found - d)[~apart]), float(np.abs(squeezed).max(initial=0.0)))
             history.append(residual)
             if residual <= self._small(found, apart):
-                return history, newton
+                if not coupled.flow.release():
+                    return history, newton
+                self.accelerator.forget()
+                d, ends, last = found, None, None
+                continue
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 taken = counted(len(history), "iteration")
                 reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g})"

@@ -236,7 +236,14 @@ class Flow(Part, Protocol):
         ...
 
     def has_films(self) -> bool:
-        """Whether the present cut has films that are thinner than a cell (collective)."""
+        """Whether the present cut has films thinner than a cell, or bodies touch that may leave one (collective)."""
+        ...
+
+    def release(self) -> bool:
+        """Let go, at a solution, what it holds to end a cycle of iterates; whether its equations are others now.
+
+        It does so once in a step. What it holds again, by a cycle near the solution, belongs to the solution.
+        """
         ...
 
     def added_product(self) -> Callable[[Array], Array] | None:

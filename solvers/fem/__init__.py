@@ -20,6 +20,7 @@ from solvers.fem.domain import (
     owned_cells,
     vtk_from_basix,
 )
+from solvers.fem.facewise import Facewise
 from solvers.fem.forms import (
     COMPILE_OPTIONS,
     Integral,

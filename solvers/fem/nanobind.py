@@ -186,6 +186,12 @@ class Compiled:
             self._coefficients = dict(zip(self._every, self._left, strict=False))
             return fem.create_form(*arguments, self._coefficients, self._constants)
 
+    def of_facets(self) -> tuple[Any, list[Any], list[Any], list[Any]]:
+        """The function for interior facets, coefficients and constants that it reads, and spaces of its arguments."""
+        form = self._compiled.ufcx_form
+        integral = form.form_integrals[form.form_integral_offsets[self._compiled.module.lib.interior_facet]]
+        return integral.tabulate_tensor_float64, self._left, list(self._constants), self._spaces
+
 
 def _integration_entities(mesh: dolfinx_mesh.Mesh, kind: Any, local: Indices32) -> Indices32:
     """Cells as they are, facets as (cell, number of the facet in it) of each of their cells."""

@@ -62,12 +62,12 @@ class Pointwise:
         axis of what is returned has the dofs of a cell of the test function, if there is one.
         """
         mesh, given, (tabulate, used, constants, sizes) = self._domain.mesh, given or {}, self._compiled
-        w = [_flat(given[f] if f in given else _of_cells(f, cells)) for f in used]
+        w = [_flat(given[f] if f in given else values_of_cells(f, cells)) for f in used]
         data = np.concatenate([np.empty((len(cells), 0)), *w], axis=1)
         numbers = np.concatenate([np.empty(0), *(np.ravel(constant.value) for constant in constants)])
         corners = calls.geometry_nodes(mesh).reshape(-1, 2**self._domain.dim)[cells]
         values = np.zeros((len(cells), len(self._points), *self._expression.ufl_shape, *sizes))
-        _tabulate(tabulate, values, data, numbers, np.ascontiguousarray(mesh.geometry.x[corners]))
+        tabulate_rows(tabulate, values, data, numbers, np.ascontiguousarray(mesh.geometry.x[corners]))
         return values
 
 
@@ -84,7 +84,8 @@ class _Numbers(ufl.Coefficient):
         return "numbers"
 
 
-def _of_cells(function: Any, cells: Indices32) -> Array:
+def values_of_cells(function: Any, cells: Indices32) -> Array:
+    """Values of a function at the dofs of local cells, shape (cells, blocks, components)."""
     space = function.function_space
     return function.x.array.reshape(-1, space.dofmap.index_map_bs)[cell_blocks(space)[cells]]
 
@@ -93,11 +94,19 @@ def _flat(values: Array) -> Array:
     return values.reshape(len(values), prod(values.shape[1:]))
 
 
-def _tabulate(tabulate: Any, values: Array, *data: Array) -> None:
-    """Call a compiled function in each cell; data: of coefficients, constants and coordinates."""
-    parameters = _FFI.typeof(tabulate).args
-    out, w, c, x = (_FFI.cast(parameters[0], part.ctypes.data) for part in (values, *data))
-    size, stride, nodes = (prod(part.shape[1:]) for part in (values, data[0], data[2]))
-    nothing = [_FFI.NULL] * (len(parameters) - 4)  # facets, permutations, later more
-    for k in range(len(values)):
-        tabulate(out + k * size, w + k * stride, c, x + k * nodes, *nothing)
+def tabulate_rows(function: Any, found: Array, w: Array, c: Array, x: Array, facets: Indices32 | None = None) -> None:
+    """Call a compiled function for each row of `found`; w, x: rows of coefficients and coordinates; c: constants.
+
+    facets: of both cells of a facet, the same for all rows.
+    """
+    kinds = _FFI.typeof(function).args
+    out, w_at, c_at, x_at = (
+        _FFI.cast(kind, part.ctypes.data) for kind, part in zip(kinds, (found, w, c, x), strict=False)
+    )
+    size, stride, nodes = (prod(part.shape[1:]) for part in (found, w, x))
+    more = [_FFI.NULL] * (len(kinds) - 4)  # facets, permutations, later more
+    turns = np.zeros(2, dtype=np.uint8)
+    if facets is not None:
+        more[:2] = _FFI.cast(kinds[4], facets.ctypes.data), _FFI.cast(kinds[5], turns.ctypes.data)
+    for k in range(len(found)):
+        function(out + k * size, w_at + k * stride, c_at, x_at + k * nodes, *more)

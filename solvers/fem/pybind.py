@@ -140,9 +140,10 @@ class Compiled:
         self._compiled, self._module, _ = jit.ffcx_jit(mesh.comm, form, jit_params=options)
         coefficients = form.coefficients()
         order = [self._compiled.original_coefficient_position[i] for i in range(self._compiled.num_coefficients)]
-        self._coefficients = [coefficients[i]._cpp_object for i in order]
-        self._constants = [constant._cpp_object for constant in form.constants()]
-        self._spaces = [argument.ufl_function_space()._cpp_object for argument in form.arguments()]
+        self._of = [coefficients[i] for i in order], form.constants()
+        self._arguments = [argument.ufl_function_space() for argument in form.arguments()]
+        self._coefficients, self._constants = ([one._cpp_object for one in some] for some in self._of)
+        self._spaces = [space._cpp_object for space in self._arguments]
 
     def on(self, entities: dict[str, Indices32]) -> Any:
         """The form over local cells or facets, by the name of the integral type."""
@@ -158,6 +159,11 @@ class Compiled:
         return cpp.fem.create_form_float64(
             int(pointer), self._spaces, self._coefficients, self._constants, tags, mesh._mesh
         )
+
+    def of_facets(self) -> tuple[Any, list[Any], list[Any], list[Any]]:
+        """The function for interior facets, coefficients and constants that it reads, and spaces of its arguments."""
+        integral = self._compiled.integrals(self._module.lib.interior_facet)[0]
+        return integral.tabulate_tensor_float64, *self._of, self._arguments
 
 
 def assemble_vector(form: Any, out: Array) -> None:

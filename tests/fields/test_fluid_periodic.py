@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import ufl
 from advised import require_advice
 from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, solve_steady, step
 
@@ -13,6 +14,7 @@ from solvers.fluid.flow.probes import at_point, on_patch
 from solvers.fluid.flow.snapshot import snapshots
 from solvers.fluid.grid.box import Grid, uniform
 from solvers.fluid.surfaces.inside import PointInBody
+from solvers.fluid.terms import forms
 from solvers.fluid.terms.boundary.patches import Patch
 
 GRADED = Grid((np.array([0, 0.5, 0.8, 1.5, 2.2, 3.0]), np.array([0, 0.2, 0.6, 0.8, 1.0])))
@@ -131,6 +133,21 @@ def test_a_period_begins_anywhere(element, shift):
         at_point(other, "velocity", ((0.61 + shift / 8) % 2.0, 0.47), 0.0)
     at_edge = at_point(other, "velocity", ((0.61 + shift / 8) % 2.0, 0.47 + 0.215), 0.0)
     assert np.isnan(list(at_edge().values())).all()  # the disc has come there
+
+
+def test_a_term_of_the_ghost_penalty_acts_at_the_end_of_a_period(monkeypatch):
+    """One that is added in `forms` alone: the disc feels the same there as elsewhere, and not what it feels without."""
+    own, (without, found) = forms.ghost_penalty, (disc_in_period(0, "q1q1").force()["disc"].sum(axis=0), [])
+
+    def with_more(flow, factors, scales, u, p, v, q):
+        more = 0.01 * ufl.jump(ufl.grad(p))[0] * ufl.jump(ufl.grad(v[1]))[0]
+        return own(flow, factors, scales, u, p, v, q) + more
+
+    monkeypatch.setattr(forms, "ghost_penalty", with_more)
+    for shift in (0, 11):  # the second disc is in two halves at the ends
+        found.append(disc_in_period(shift, "q1q1").force()["disc"].sum(axis=0))
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert np.abs(found[0] - without).max() > 1e-4 * np.abs(without).max()
 
 
 def two_discs(shift, element, speed=0.5):

@@ -159,8 +159,18 @@ def test_plate_that_is_pushed_through_a_duct_with_multigrid(element):
     [(2, "q1q1", 8), pytest.param(3, "q1q1", 8, marks=SLOW), pytest.param(2, "q2q1", 8, marks=SLOW)],
 )
 def test_multigrid_around_thin_plates_on_processes(processes, element, count):
-    """The same forces as on one, in equal and nested cells; no unknown belongs to no node."""
+    """The same forces as on one, in equal and nested cells; all unknowns belong to nodes; equal ones are in blocks."""
     on_processes(processes, __file__, element, count)
+
+
+def require_a_block(grid):
+    """Owned cells of the box are a block, and those of thin bodies with fluid are in it."""
+    size, sheets, own = grid.grid.size, grid.sheets, grid.in_sheets[: grid.owned]
+    in_box, others = own[own < size], own[(own >= size) & (own < size + sheets.singles)]
+    index = np.stack(np.unravel_index(in_box, grid.grid.shape, order="F"))
+    assert np.prod(index.max(axis=1) - index.min(axis=1) + 1) == len(in_box)
+    assert len(others)
+    assert np.isin(sheets.box_cells(others), in_box).all()
 
 
 def main(element, count):
@@ -175,6 +185,8 @@ def main(element, count):
             assert fluid.grid.sheets is not None
             unknowns = fluid.unknowns
             assert unknowns.owned == unknowns.velocity.owned * unknowns.dim + unknowns.pressure.owned
+            if comm.size > 1 and cells is equal_cells:
+                require_a_block(fluid.grid)
         (force, many), (alone, few) = forces
         assert np.abs(force - alone).max() < 1e-7 * np.abs(alone).max(), (force, alone)
         assert many <= few + 6, (many, few)

@@ -1,4 +1,4 @@
-"""Parts of the fluid that touching bodies divide within a step share nodes; a new step parts them."""
+"""Parts of the fluid that touching bodies divide within a step share nodes, wherever its iterates were."""
 
 import numpy as np
 from fluid_setup import block, body
@@ -29,12 +29,26 @@ def test_flaps_that_touch_and_open_within_a_step():
     thin, other = (ThinBodies(grid, bodies, (), None) for _ in range(2))
     parted = other.sheets(facets, touching)
     opened = thin.sheets(facets, apart)
+    thin.begin_step()
     joined = thin.sheets(facets, touching)
     assert not len(opened.touching)
     assert len(parted.touching)
     assert joined.node_count(1) < parted.node_count(1)
     thin.begin_step()
     assert thin.sheets(facets, touching).same_unknowns(parted)
+    # the step starts where they touch, and iterates part them in vain
+    for _ in range(2):
+        assert thin.sheets(facets, apart).same_unknowns(opened)
+        assert thin.sheets(facets, touching).same_unknowns(parted)
+        assert not thin.release(facets, touching)
+    thin.sheets(facets, apart)
+    assert thin.sheets(facets, touching).same_unknowns(joined)  # a cycle
+    assert thin.release(facets, touching)
+    assert thin.sheets(facets, touching).same_unknowns(parted)
+    for position in (apart, touching, apart, touching):
+        thin.sheets(facets, position)
+    assert thin.sheets(facets, touching).same_unknowns(joined)  # it comes back: it belongs to the solution
+    assert not thin.release(facets, touching)
 
 
 def test_parts_with_a_common_facet_are_not_divided_if_they_were_two_before():
@@ -46,15 +60,15 @@ def test_parts_with_a_common_facet_are_not_divided_if_they_were_two_before():
 
 
 def test_the_start_of_a_step_is_no_iterate():
-    """Nor after a step with joined parts: what is at the start comes back once without being joined."""
+    """What is at the start comes back once without being joined, as after a predictor that is taken back."""
     grid = uniform([0, 0], [2, 1], [20, 10])
     x, facets = block([0.92, -0.2], [0.95, 0.54])
     thin = ThinBodies(grid, [body("flap", x, facets, motion=lambda x, t: (x, 0.0 * x))], (), None)
-    thin.sheets(facets, Motion(x, 0.0 * x))
+    there, away = Motion(x, 0.0 * x), Motion(x - [0.0, 0.05], 0.0 * x)
+    alone = thin.sheets(facets, there)
     for _ in range(2):
         thin.begin_step()
-        thin._joined, thin._x = {0: frozenset({0})}, None
-        thin.sheets(facets, Motion(x, 0.0 * x))
-        assert thin._tried == []
-        thin.sheets(facets, Motion(x + 0.05, 0.0 * x))
-        assert len(thin._tried) == 1
+        for position in (there, away, there, away, there):
+            thin.sheets(facets, position)
+        assert not thin.release(facets, there)
+        assert thin.sheets(facets, there).same_unknowns(alone)

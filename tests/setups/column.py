@@ -156,6 +156,9 @@ class Column:
     def has_films(self):
         return False
 
+    def release(self):
+        return False
+
     def squeezed(self):
         return np.zeros(0)
 

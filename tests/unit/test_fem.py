@@ -260,6 +260,41 @@ def test_numbers_of_cells_that_recur(square):
     np.testing.assert_allclose(found[:, 0], [2.0 * middle[0], 7.0 * middle[1], 12.0 * middle[1]])
 
 
+@pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])
+def test_tensors_of_two_cells(cell_type):
+    """Of cells that meet, they are the assembled form; and of cells that meet once one is moved by a period."""
+    domain = make_domain(cell_type)
+    space, factor = fem.flow_space(domain, 1), fem.function(fem.cellwise_space(domain))
+    flow, test, trial = fem.function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
+    flow.x.array[:], factor.x.array[:] = np.random.default_rng(1).normal(size=len(flow.x.array)), (3.0, -2.0)
+    normal, dS = ufl.FacetNormal(domain.mesh), fem.measure(domain, "dS", 2)
+    slopes = [ufl.jump(ufl.grad(some), normal) for some in (test, trial, flow)]
+    weight = fem.constant(domain, 2.0) * factor("+") ** 2 * factor("-") ** 2
+    left, right = (np.array([k], dtype=np.int32) for k in np.argsort(fem.cell_midpoints(domain)[0]))
+    size = space.dofmap.index_map_bs
+    dofs = (fem.cell_blocks(space)[:, :, None] * size + np.arange(size)).reshape(2, -1)
+    both = np.concatenate([dofs[right], dofs[left]], axis=1)[0]
+    faces = fem.interior_facets(domain)[0]
+
+    linear = fem.Integral(domain, weight * ufl.inner(slopes[0], slopes[2]) * dS)
+    exact, total = np.zeros(len(flow.x.array)), np.zeros(len(flow.x.array))
+    fem.assemble_vector(linear.on(interior_facet=faces), exact)
+    facewise = fem.Facewise(domain, linear)
+    np.add.at(total, both, facewise.between(facewise.data(right), facewise.data(left), 0, 0.0)[0])
+    assert np.abs(exact).max() > 1.0
+    np.testing.assert_allclose(total, exact, atol=1e-12)
+
+    bilinear = fem.Integral(domain, weight * ufl.inner(slopes[0], slopes[1]) * dS)
+    facewise = fem.Facewise(domain, bilinear)
+    one, other = facewise.data(right), facewise.data(left)
+    met = facewise.between(one, other, 0, 0.0)
+    total[:] = 0.0
+    np.add.at(total, both, met[0] @ flow.x.array[both])
+    np.testing.assert_allclose(total, exact, atol=1e-12)
+    np.testing.assert_allclose(facewise.between(other, one, 0, -2.0), met, atol=1e-12)
+    assert facewise.between(one[:0], other[:0], 0, 0.0).shape == (0, *met.shape[1:])
+
+
 @pytest.mark.parametrize("degree", [1, 2])
 def test_flow_spaces(square, degree):
     """Velocity and pressure dofs are all different, together all there are, and lie at the nodes of the lattice."""

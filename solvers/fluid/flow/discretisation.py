@@ -53,8 +53,8 @@ def discretise(
 ) -> Discretisation:
     """The discretisation of a flow around bodies (collective)."""
     destinations = None
-    if comm.size > 1 and sheets is None and not isinstance(grid, Nested):
-        destinations = partition(comm, grid, bodies)
+    if comm.size > 1 and not isinstance(grid, Nested):
+        destinations = partition(comm, grid, bodies, sheets)
     distributed = DistributedGrid(comm, grid, sheets, destinations)
     unknowns = Unknowns(distributed, settings.degree, periodic_axes(patches))
     boundary = Boundary(distributed, unknowns, patches)

@@ -247,15 +247,19 @@ class Fluid:
         return self.moving.outside(surfaces)
 
     def has_films(self) -> bool:
-        """Whether the present cut has films that are thinner than a cell (collective)."""
-        return bool(self.comm.allreduce(self.cut.film is not None, op=MPI.LOR))
+        """Whether the present cut has films thinner than a cell, or bodies touch that may leave one (collective)."""
+        touching = self.grid.sheets is not None and len(self.grid.sheets.touching) > 0
+        return bool(self.comm.allreduce(touching or self.cut.film is not None, op=MPI.LOR))
+
+    def release(self) -> bool:
+        """Let parts of the fluid go that cycles of iterates join; whether the unknowns are others without them."""
+        return self.moving.release()
 
     def move(self, coupled: Mapping[str, Motion], *, with_solid: bool = False) -> None:
         """Cut the grid by the surfaces at their present positions, and set what depends on the cut (collective).
 
         coupled: motions of the bodies that another field moves, by name; the others move as prescribed.
-        with_solid: a monolithic scheme solves the equations of these bodies too, which determine the pressure level of
-        closed pockets.
+        with_solid: the system has the equations of these bodies, too, which determine the pressure of closed pockets.
         Raises StepFailed if surfaces have moved too far in this step, or are close to coarse cells or periodic faces.
         """
         with self.timer("cut"):
@@ -463,10 +467,7 @@ class Fluid:
         return self.system.interface_entries(self.iterate.held, vertices, rule.alpha, swept, improved=self._improved)
 
     def balances(self) -> tuple[Array, float, float]:
-        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method, power of patches).
-
-        Collective.
-        """
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method, of patches)."""
         if self._balances is None or self._balances.system is not self.system:
             self._balances = Balances(self.system)
         return self._balances(self.iterate.held)

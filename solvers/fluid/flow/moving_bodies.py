@@ -78,6 +78,10 @@ class MovingBodies:
         """Those around thin bodies at the present positions, see `ThinBodies.sheets`."""
         return self.thin.sheets(*self.surfaces.together(self.motions))
 
+    def release(self) -> bool:
+        """Whether sheets without what cycles join have other unknowns, see `ThinBodies.release`."""
+        return self.thin.release(*self.surfaces.together(self.motions))
+
     def ways(self, t: float, dt: float) -> dict[str, tuple[NDArray[np.int64], tuple[Array, Array]]]:
         """Facets, and positions [m] now and after a step from t of length dt [s], by name."""
         found = {}

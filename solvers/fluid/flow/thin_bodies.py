@@ -16,7 +16,8 @@ from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.geometry.pieces import off_boundary
-from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined_in, recurring
+from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined_in, recurring, united
+from solvers.fluid.geometry.thin.sheet_nodes import Joined, same_nodes
 from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
@@ -62,9 +63,12 @@ class ThinBodies:
         self._x: Array | None = None
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
         self._closed: NDArray[np.int64] | None = None  #: `Sheets.closed` of this step; None: it has no sheets yet
-        self._first: Sheets | None = None  #: sheets at the start of this step
-        self._tried: list[Sheets] = []  #: sheets of the iterates of this step, in their order
-        self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
+        self._alone: Sheets | None = None  #: sheets of the latest position, with no part joined
+        self._before: Sheets | None = None  #: those of the accepted position, from which the step starts
+        self._tried: list[Sheets] = []  #: sheets of the positions of this step, in their order
+        self._held: Joined = {}  #: parts that a cycle of this step joins
+        self._joined: Joined = {}  #: all parts that are joined in the present sheets
+        self._released = False  #: the cycles of this step have been let go once
 
     @property
     def may_follow(self) -> bool:
@@ -82,16 +86,9 @@ class ThinBodies:
         if not self._possible or (self._searched and not self.follows):
             return self._sheets
         if self._x is None or not np.array_equal(self._x, motion.x):
-            found = self._find(facets, motion.x)
-            if found is not None and self._join_parts(found):
-                found = self._find(facets, motion.x)
-            if found is not None and self._first is not None:
-                if not (self._tried and self._tried[-1].same_unknowns(found)):
-                    self._tried.append(found)
+            found = self._at(facets, motion.x)
             self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
         if self._sheets is not None:
-            if self._first is None:
-                self._first = self._sheets
             if self._closed is None:
                 self._closed = self._sheets.touching
             if not np.array_equal(self._sheets.closed, self._closed):
@@ -106,7 +103,32 @@ class ThinBodies:
             return True
         return may_be_thin(grid, facets[self._wet & facets_of_walls(grid, facets, x)], x, most)
 
-    def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
+    def _at(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
+        """Sheets at a position, where parts are joined that touching bodies divide here or at the start of the step.
+
+        These depend on both positions alone. Those that a cycle joins depend on the way; see `release`.
+        """
+        alone = self._find(facets, x, {})
+        if alone is None:
+            return None
+        beside = {} if self._before is None else divided_by_touching(self._before, alone)
+        found, self._alone = self._with(alone, facets, x, united(beside, self._held)), alone
+        if cycle := recurring(self._tried, found):
+            self._held = united(self._held, joined_in(cycle))
+            found = self._with(alone, facets, x, united(beside, self._held))
+        if not (self._tried and self._tried[-1].same_unknowns(found)):
+            self._tried.append(found)
+        return found
+
+    def _with(self, alone: Sheets, facets: NDArray[np.int64], x: Array, joined: Joined) -> Sheets:
+        self._joined = joined
+        if not same_nodes(alone.parts, joined):
+            return alone
+        found = self._find(facets, x, joined)
+        assert found is not None
+        return found
+
+    def _find(self, facets: NDArray[np.int64], x: Array, joined: Joined) -> Sheets | None:
         off = off_boundary(self._grid, x[facets])
         thin, always = THIN_IF_MOVING, self.follows
         ties = None if self._tied is None else (self._tied, self._wet)
@@ -118,27 +140,31 @@ class ThinBodies:
             thin=thin if self._thin else 0,
             always=always,
             closing=self._may_close,
-            joined=self._joined,
+            joined=joined,
             tied=ties,
             repeated=self._repeated,
         )
 
-    def _join_parts(self, now: Sheets) -> bool:
-        """Keep parts joined until the step ends that these sheets divide in vain; returns whether some are new."""
-        before, earlier = dict(self._joined), [] if self._first is None else [self._first]
-        for parts in (
-            joined_in(recurring(self._tried, now)),
-            divided_by_touching([*earlier, *self._tried], now),
-        ):
-            for cell, facets in parts.items():
-                self._joined[cell] = self._joined.get(cell, frozenset()) | facets
-        return self._joined != before
+    def release(self, facets: NDArray[np.int64], motion: Motion) -> bool:
+        """Let parts go that a cycle joins, at a solution; returns whether it has other unknowns without them.
+
+        A solution without them is then looked for from there. If the cycle comes back there is none nearby, and parts
+        that it joins belong to the solution. So no solution depends on the way to it.
+        """
+        if not self._held or self._released:
+            return False
+        before, self._released = self._sheets, True
+        self._held, self._tried, self._x = {}, [], None
+        now = self.sheets(facets, motion)
+        assert before is not None
+        return now is None or not now.same_unknowns(before)
 
     def begin_step(self) -> None:
-        """Forget the sheets of the last step, and search once for thin bodies if there has been none."""
-        self._first, self._tried, self._searched, self._closed = None, [], False, None
+        """Start from the accepted position, and search once for thin bodies if there has been none."""
+        self._before, self._tried, self._searched, self._closed = self._alone, [], False, None
+        self._held, self._released = {}, False
         if self._joined:
-            self._joined, self._x = {}, None
+            self._joined, self._sheets = {}, self._alone
 
     def save(self) -> State:
         """The state: whether a body has been thin, and (cell, facet) of joined parts."""
@@ -148,11 +174,12 @@ class ThinBodies:
     def restore(self, state: State) -> None:
         """Restore a saved state."""
         self.begin_step()
+        self._before = None
         self.follows, self._searched = bool(state["follows"]), True
         for cell, facet in np.asarray(state["joined"]).tolist():
-            self._joined[cell] = self._joined.get(cell, frozenset()) | {facet}
+            self._held = united(self._held, {cell: frozenset({facet})})
         if self._possible is not False:
-            self._x = self._sheets = None
+            self._x = self._sheets = self._alone = None
 
 
 @dataclass(frozen=True)

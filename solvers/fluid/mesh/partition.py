@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from solvers import kernels
 from solvers.api import Array
+from solvers.fluid.geometry.thin.sheets import Sheets
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.surfaces.immersed import ImmersedBody
 from solvers.fluid.surfaces.surface import Motion, together
@@ -92,9 +93,19 @@ def destinations(shape: Sequence[int], owner: NDArray[np.int32]) -> tuple[NDArra
 
 
 def partition(
-    comm: MPI.Comm, grid: Grid, bodies: Sequence[ImmersedBody]
+    comm: MPI.Comm, grid: Grid, bodies: Sequence[ImmersedBody], sheets: Sheets | None = None
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """`destinations` of all cells of a box on rank 0, nothing on the others."""
+    """`destinations` of all cells of a mesh on rank 0, nothing on the others.
+
+    New cells of `sheets` belong to the process of the cell in their place, both cells of a pair to that of the first.
+    """
     if comm.rank > 0:
         return np.empty(0, dtype=np.int32), np.zeros(1, dtype=np.int32)
-    return destinations(grid.shape, blocks(grid.shape, work(grid, bodies), comm.size))
+    owner = blocks(grid.shape, work(grid, bodies), comm.size)
+    found, offsets = destinations(grid.shape, owner)
+    if sheets is None:
+        return found, offsets
+    places = sheets.cells.copy()
+    places[sheets.singles + 1 :: 2] = places[sheets.singles :: 2]
+    last = offsets[-1] + np.arange(1, len(places) + 1, dtype=np.int32)
+    return np.concatenate([found, owner[places]]), np.concatenate([offsets, last])

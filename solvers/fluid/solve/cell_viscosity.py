@@ -40,13 +40,6 @@ class CellViscosity:
         """The coefficients on faces between cells: those of `set_scales`, which iterates do not change."""
         return flow if self._of_scales is None else replace(flow, mu=avg(self._of_scales), shear=None)
 
-    def of_scales(self) -> Array:
-        """mu [Pa s] of `on_faces` in the local cells."""
-        if self._of_scales is None:
-            return np.full(len(self._unknowns.grid.numbers), self._settings.viscosity)
-        found: Array = self._of_scales.x.array
-        return found
-
     def of(self, cells: Indices32) -> Array | float:
         """mu [Pa s] of local cells."""
         if self._function is None:

@@ -43,7 +43,7 @@ from solvers.fluid.terms.coupling_entries import InterfaceEntries, interface_ent
 from solvers.fluid.terms.film_penalty import least_in_films
 from solvers.fluid.terms.gap_terms import GapTerms
 from solvers.fluid.terms.interface import InterfaceTerms
-from solvers.fluid.terms.poorly_cut.ghost import FaceFlow, Scales
+from solvers.fluid.terms.poorly_cut.ghost import Scales
 from solvers.fluid.terms.poorly_cut.ghost_choice import choose_cut_penalty
 from solvers.fluid.terms.shape_derivatives.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
 from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives, film_derivatives
@@ -78,12 +78,7 @@ class FlowSystem:
         #: gaps of a few cells, with first-order velocities
         with_gaps = with_bodies and settings.degree == 1
         self.gaps = GapTerms(grid, settings.viscosity, settings.density) if with_gaps else None
-        of_faces = FaceFlow(
-            self.viscosity.on_faces(self.terms),
-            self.viscosity.of_scales,
-            self.history,
-            lambda: float(self._alpha.value),
-        )
+        of_faces = self.viscosity.on_faces(self.terms)
         self.cut_penalty = (
             choose_cut_penalty(unknowns, of_faces, settings.penalties, self.gaps) if with_bodies else None
         )

@@ -102,11 +102,6 @@ class GapTerms:
         """Mask of the local cells with another ghost penalty."""
         return self._pressure.x.array < 1.0
 
-    def of_faces(self) -> tuple[Array, Array]:
-        """Factors in the local cells, see `forms.GapScales`: of the pressure, (cells,), and kinks, (cells, dim)."""
-        kinks = np.stack([function.x.array for function in self._kink], axis=1)
-        return (np.ones(len(kinks)), 0.0 * kinks) if self.marked is None else (self._pressure.x.array, kinks)
-
     def among(self, cells: Indices32) -> Indices32:
         """Those in gaps among some local cells."""
         assert self.marked is not None

@@ -14,15 +14,17 @@ from itertools import combinations, permutations
 import numpy as np
 
 from solvers.algebra.connected import connected_parts
+from solvers.fluid.geometry.thin.sheet_nodes import Joined
 from solvers.fluid.geometry.thin.sheets import Sheets
 
 
 def recurring(earlier: Sequence[Sheets], now: Sheets) -> list[Sheets]:
-    """Sheets since the last time with the unknowns of the present ones; empty if there was none, or nothing since."""
-    for number in range(len(earlier) - 2, -1, -1):
-        if earlier[number].same_unknowns(now):
-            return list(earlier[number:])
-    return []
+    """Sheets since the last time with the unknowns of the present ones, where these come back for the second time.
+
+    Empty before: where active sets change, Newton's method may find its way back once.
+    """
+    same = [number for number, sheets in enumerate(earlier[:-1]) if sheets.same_unknowns(now)]
+    return list(earlier[same[-1] :]) if len(same) > 1 else []
 
 
 def joined_in(cycle: Sequence[Sheets]) -> dict[int, frozenset[int]]:
@@ -36,14 +38,17 @@ def joined_in(cycle: Sequence[Sheets]) -> dict[int, frozenset[int]]:
     return found
 
 
-def divided_by_touching(earlier: Sequence[Sheets], now: Sheets) -> dict[int, frozenset[int]]:
-    """Facets of parts that are fewer parts in earlier sheets or now, in cells where bodies touch in one of both."""
+def divided_by_touching(before: Sheets, now: Sheets) -> dict[int, frozenset[int]]:
+    """Facets of parts that are fewer parts in other sheets, in cells where bodies touch in one of both."""
     found: dict[int, frozenset[int]] = {}
-    for sheets in earlier:
-        for cell in np.union1d(sheets.touching, now.touching).tolist():
-            parts = (some.facets_of_parts.get(cell, []) for some in (sheets, now))
-            found[cell] = found.get(cell, frozenset()) | _divided(*parts)
+    for cell in np.union1d(before.touching, now.touching).tolist():
+        found[cell] = _divided(*(some.facets_of_parts.get(cell, []) for some in (before, now)))
     return {cell: facets for cell, facets in found.items() if facets}
+
+
+def united(one: Joined, other: Joined) -> dict[int, frozenset[int]]:
+    """The facets of both, by cell."""
+    return {cell: one.get(cell, frozenset()) | other.get(cell, frozenset()) for cell in sorted({*one, *other})}
 
 
 def _divided(one: list[set[int]], other: list[set[int]]) -> frozenset[int]:

@@ -15,8 +15,8 @@ from solvers.fluid.settings.penalties import Penalties
 from solvers.fluid.terms import forms
 from solvers.fluid.terms.gap_terms import GapTerms
 from solvers.fluid.terms.matrix import Pattern
-from solvers.fluid.terms.poorly_cut.ghost import FaceFlow, Scales
-from solvers.fluid.terms.poorly_cut.seam_penalty import CellScales, SeamPenalty
+from solvers.fluid.terms.poorly_cut.ghost import Scales
+from solvers.fluid.terms.poorly_cut.seam_penalty import SeamPenalty
 
 
 class FacePenalty:
@@ -27,16 +27,14 @@ class FacePenalty:
     def __init__(
         self,
         unknowns: Unknowns,
-        of_faces: FaceFlow,
+        flow: forms.Coefficients,
         penalties: Penalties,
         gaps: GapTerms,
         seams: SeamPenalty | None = None,
     ):
         """gaps: those of the present cut when it is set; seams: across the ends of periods; None: there are none."""
         self.unknowns, self._grid, self._gaps = unknowns, unknowns.grid, gaps
-        self._of_faces, self._seams = of_faces, seams
-        self._scales: Scales | None = None
-        flow = of_faces.coefficients
+        self._seams = seams
         domain = self._grid.domain
         self.outside = np.zeros(unknowns.owned, dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
@@ -67,7 +65,7 @@ class FacePenalty:
         convective = scales.cell_speed * h
         phi = scales.viscosity / scales.density + convective + scales.alpha * h**2
         self._phi.x.array[:], self._convective.x.array[:] = phi, convective**2 / phi
-        self._scales, self.stale = scales, True
+        self.stale = True
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
         marked = self._gaps.marked
@@ -89,8 +87,12 @@ class FacePenalty:
     def assemble(self, matrix: PETSc.Mat, history: Array) -> None:
         self.stale = False
         history[:] = 0.0
-        if self._seams is not None and self._scales is not None:
-            self._seams.assemble(matrix, self._scales, self._cell_scales(), history)
+        if self._seams is not None:
+            self._seams.assemble_matrix(matrix, self._form)
+            if self._history is not None:
+                self._seams.assemble_vector(self._history, history)
+            if self._marked is not None:
+                self._seams.assemble_matrix(matrix, self._in_gaps)
         if not len(self._faces):
             return
         fem.assemble_matrix(matrix, self._form.on(interior_facet=self._faces))
@@ -100,11 +102,6 @@ class FacePenalty:
             faces, sides = self._grid.find_interior_faces()
             beside = np.isin(self._faces, faces[self._gaps.narrow[sides].any(axis=1)])
             fem.assemble_matrix(matrix, self._in_gaps.on(interior_facet=self._faces[beside]))
-
-    def _cell_scales(self) -> CellScales:
-        phi, convective, has_history = (f.x.array for f in (self._phi, self._convective, self._has_history))
-        pressure, kink = self._gaps.of_faces()
-        return CellScales(self._of_faces.viscosity(), phi, convective, has_history, pressure, kink)
 
     def settle(self, values: Array) -> Array:
         return values

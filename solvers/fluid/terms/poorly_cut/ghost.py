@@ -8,9 +8,8 @@ gradient in one cell, depends more on the position of the cut (docs/verification
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid.cut.cut import Cut
-from solvers.fluid.terms import forms
 from solvers.fluid.terms.matrix import Pattern
 
 
@@ -32,16 +30,6 @@ class Scales:
     alpha: float  #: d(u_t)/du [1/s]
     cell_speed: Array  #: largest velocity in each local cell [m/s]
     speed: Array  #: at each local node of the velocity [m/s]
-
-
-@dataclass(frozen=True)
-class FaceFlow:
-    """The flow on faces between cells."""
-
-    coefficients: forms.Coefficients
-    viscosity: Callable[[], Array]  #: mu [Pa s] in the local cells
-    past: Any  #: function, history of u_t = alpha u - history [m/s^2], at local dofs
-    alpha: Callable[[], float]  #: [1/s]
 
 
 class CutPenalty(Protocol):
