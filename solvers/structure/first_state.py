@@ -40,7 +40,7 @@ class FirstState(Statics):
     """f_int(u) + C v = f_ext(t) for massless nodes, in a short step dt from u_0.
 
     Without damping their positions are those of equilibrium. With damping they hardly move, and v = (u - u_0) / dt is
-    their initial velocity. The velocities of other nodes, and those that supports prescribe to massless ones, are given.
+    their initial velocity. Velocities of other nodes, and what supports prescribe to massless ones, are given.
     """
 
     def __init__(self, *, damped: bool):
