@@ -64,9 +64,7 @@ class Dynamics:
         if structure.comm.allreduce(len(structure.inertia.find_massless())):
             others = np.setdiff1d(np.arange(structure.layout.size), structure.inertia.find_massless())
             held = structure.held.stopped(others, structure.now.u)
-            with structure.by(
-                FirstState(structure.inertia.find_massless(), damped=structure.damping is not None), held, t, SHORT * dt
-            ):
+            with structure.by(FirstState(damped=structure.damping is not None), held, t, SHORT * dt):
                 structure.solve()
         structure.now.mean[:] = structure.now.v
         self._solve_acceleration(structure)
@@ -131,7 +129,7 @@ class Dynamics:
         def settle(lighter: NDArray[np.int64]) -> None:
             others = np.setdiff1d(np.arange(structure.layout.size), lighter)
             held = structure.held.stopped(others, structure.now.u)
-            with structure.by(FirstState(lighter, damped=structure.damping is not None), held, t, SHORT * dt):
+            with structure.by(FirstState(damped=structure.damping is not None), held, t, SHORT * dt):
                 structure.solve()
 
         exchange(structure, switch, settle)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.algebra.blocks import times
@@ -41,18 +40,18 @@ class FirstState(Statics):
     """f_int(u) + C v = f_ext(t) for massless nodes, in a short step dt from u_0.
 
     Without damping their positions are those of equilibrium. With damping they hardly move, and v = (u - u_0) / dt is
-    their initial velocity. The velocity of other nodes is given.
+    their initial velocity. Velocities of other nodes, and what supports prescribe to massless ones, are given.
     """
 
-    def __init__(self, moving: NDArray[np.int64], *, damped: bool):
-        """moving: owned dofs without mass; damped: whether the structure has damping."""
-        self._moving, self._damped = moving, damped
+    def __init__(self, *, damped: bool):
+        """damped: whether the structure has damping."""
+        self._damped = damped
 
     def motion(self, structure: MovingStructure, dt: float) -> tuple[Array, Array]:
-        v = structure.now.v.copy()
+        v, held = structure.now.v, structure.held
         if self._damped:
-            v[self._moving] = (structure.now.u - structure.old.u)[self._moving] / dt
-        return v, structure.now.a
+            v = held.part(v) + held.free_part(structure.now.u - structure.old.u) / dt
+        return v.copy(), structure.now.a
 
     def balance(self, structure: MovingStructure) -> Array:
         return self.reaction(structure) + structure.now.damping

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from contact_setup import make_body, make_contact
+from contact_setup import make_body, make_contact, turned
 from scipy.spatial.transform import Rotation
 from structure_setup import block, constant
 from test_contact_start import TIGHT, advance
@@ -24,7 +24,7 @@ from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
 from solvers.structure.rayleigh import Damping
-from solvers.structure.supports import Support
+from solvers.structure.supports import Roller, Support
 
 SOFT = NeoHooke(4e2, 6e2, 2.0)
 
@@ -94,6 +94,34 @@ def test_momentum_and_energy_stay_when_pairs_come_and_go(dim, rho_inf):
     assert np.abs(lost).max() < (1e-3 if rho_inf == 1.0 else 2e-2)
     jumps = np.abs(np.diff(found[:, -1]))[[4, 11]] / found[0, -1]
     assert jumps.max() < 2e-3
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0])
+@pytest.mark.parametrize("first", [0, 5])
+def test_supports_move_massless_nodes_too(first, angle):
+    """A damped block that is pressed evenly, with a pair in reach from a step on, which never closes: as without it.
+
+    Supports hold two nodes of the pair. At 30 degrees they are oblique.
+    """
+    turn = Rotation.from_euler("z", angle, degrees=True).as_matrix()[:2, :2]
+    mesh, down, rate = turned(block("quad", 4), turn), turn @ [0.0, -1.0], 0.5
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(1.0), damping=Damping(0.0, 0.1))
+    material = NeoHooke(4e2, 0.0, 1e-3)  # nothing moves across
+    start = tuple(lambda x, t, i=i: -rate * (down @ x[:2]) * down[i] for i in range(2))
+
+    def forces(present_from):
+        supports = [Roller("bottom", down), Roller("top", down, lambda x, t: rate * t), Support([0], 0.0)]
+        body = make_body("body", mesh, material, supports=supports, initial_velocity=start)
+        structure, contact = make_contact(
+            [body], [(("body", "right"), FAR[2])], time=time, settings=TIGHT, exchanges_mass=True
+        )
+        contact.find_present = lambda u, v, t, dt: np.array([t > (present_from - 0.5) * dt])
+        found = [structure.now.internal + structure.now.damping for _ in advance(structure, 0.01, 15)]
+        assert len(structure.inertia.find_massless()) == (10 if present_from < 15 else 0)
+        return np.array(found)
+
+    without = forces(99)
+    assert np.abs(forces(first) - without).max() < 1e-4 * np.abs(without).max()
 
 
 def test_mass_returns_after_an_impact():
