@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 
 #: Length relative to a period up to which something is not longer: rounding.
-SAME_LENGTH = 1e-9
+SAME_AS_PERIOD = 1e-9
 
 Box = tuple[Array, Array]  #: lowest and highest coordinates [m]
 
@@ -72,4 +72,4 @@ def way_of(periods: Sequence[int], lengths: Array) -> Array:
 
 def without_longer(x: Array, lengths: Array) -> Array:
     """The lengths of periods that points [m], (n, dim), span no more than: a longer surface covers its images."""
-    return np.where(np.ptp(x, axis=0) > (1.0 + SAME_LENGTH) * lengths, np.inf, lengths)
+    return np.where(np.ptp(x, axis=0) > (1.0 + SAME_AS_PERIOD) * lengths, np.inf, lengths)
