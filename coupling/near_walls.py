@@ -21,6 +21,7 @@ from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
 from solvers.contact.reach import EDGES, WAYS
 from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.periods import gap_of_boxes, no_periods
 from solvers.mesh.tessellation import unit_normals
 from solvers.structure.field import Structure
 from solvers.structure.time_scheme import Statics
@@ -41,6 +42,7 @@ class WallPair:
     inward: float  #: 1 or -1: direction of the axis into the box
     pair: Pair
     embedded: bool = False  #: some of the body is behind the face at the start
+    periods: Array | None = None  #: lengths [m] after which space repeats, shape (dim,); None: it does not
 
     @cached_property
     def simplices(self) -> NDArray[np.int64]:
@@ -77,8 +79,9 @@ class WallPair:
         low, high = corners.min(axis=-2)[..., along], corners.max(axis=-2)[..., along]
         parts = self.pair.master.corners[:, :, along]
         found = np.zeros(corners.shape[:2], dtype=bool)
+        lengths = (no_periods(corners.shape[-1]) if self.periods is None else self.periods)[along]
         for start, end in zip(parts.min(axis=1), parts.max(axis=1), strict=True):
-            found |= ((low <= end) & (high >= start)).all(axis=-1)
+            found |= gap_of_boxes((low, high), (start, end), lengths) <= 0.0
         return found
 
 

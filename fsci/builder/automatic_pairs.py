@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.builder.elements import lame_at_cells
-from fsci.builder.facing import Face, face, faces, meeting
+from fsci.builder.facing import Face, face, faces, images, meeting
 from fsci.builder.on_first import shared
+from fsci.builder.periods import periods
 from fsci.case import Case
 from fsci.case.contact import Friction, PairSection, Side
 from fsci.case.supports import SupportSection
@@ -87,10 +88,11 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]
     for first, second in combinations(candidates(case, meshes), 2):
         if first.rigid or not first.faces or not second.faces or {first.name, second.name} in named:
             continue
-        for pair in meeting(first.faces, second.faces, case.contact.reach, anywhere=second.free):
-            name, settings = _pair(case, (first, second), pair, tied)
-            if settings.slave not in tied:
-                found[name] = settings
+        for others in images(first.faces, second.faces, periods(case)):
+            for pair in meeting(first.faces, others, case.contact.reach, anywhere=second.free):
+                name, settings = _pair(case, (first, second), pair, tied)
+                if settings.slave not in tied:
+                    found[name] = settings
     return found
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.periods import put_within
 from fsci.case import Case
 from fsci.case.fluid import PatchSection
 from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
@@ -25,7 +26,7 @@ def closed_faces(case: Case) -> Iterator[Wall]:
             axis = "xyz".index(face[0])
             position = (grid.start if face[1] == "-" else grid.to)[axis]
             if is_closed(patch, axis):
-                yield Wall(name, face, float(position), None if patch.where is None else _within(patch))
+                yield Wall(name, face, float(position), None if patch.where is None else _within(case, patch))
 
 
 def is_closed(patch: PatchSection, axis: int) -> bool:
@@ -36,7 +37,7 @@ def is_closed(patch: PatchSection, axis: int) -> bool:
     return PATCH_KINDS[patch.kind].normal_given
 
 
-def _within(patch: PatchSection) -> Callable[[Array], NDArray[np.bool_]]:
+def _within(case: Case, patch: PatchSection) -> Callable[[Array], NDArray[np.bool_]]:
     where = patch.where
     assert where is not None
-    return lambda x: np.broadcast_to(where(x, 0.0), x.shape[1]) > 0.0
+    return lambda x: np.broadcast_to(where(put_within(case, x), 0.0), x.shape[1]) > 0.0

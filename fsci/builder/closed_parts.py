@@ -26,7 +26,7 @@ class ClosedPart:
     position: float  #: coordinate of the face [m]
     inward: float  #: 1 or -1: direction of the axis into the box
     #: lowest and highest corners of rectangles (2D: segments) on the face [m], shape (n, 2, dim); those that end at an
-    #: edge of the box go on behind it by half of its size
+    #: edge of the box go on behind it by half of its size, but not along periods, where they have images
     rectangles: Array
 
     @property
@@ -137,7 +137,8 @@ def _corners(
     low, high = np.array(fluid.grid.start), np.array(fluid.grid.to)
     corners = np.full((len(found), 2, len(low)), position)
     for k, (other, inner) in enumerate(zip(_others(fluid, axis), edges, strict=True)):
-        x, beyond = inner.copy(), 0.5 * (high - low)[other]
+        repeats = any(patch.periodic and "xyz"[other] == patch.on[0][0] for patch in fluid.patches.values())
+        x, beyond = inner.copy(), 0.0 if repeats else 0.5 * (high - low)[other]
         x[0], x[-1] = low[other] - beyond, high[other] + beyond
         corners[:, :, other] = [[x[first], x[last]] for first, last in (one[k] for one in found)]
     return corners

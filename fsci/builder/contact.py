@@ -14,6 +14,7 @@ from coupling.contact_surfaces import contact_surface
 from fsci.builder.named import named
 from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.overlap import facets_in_each_other
+from fsci.builder.periods import periods
 from fsci.case import Case, CaseError
 from fsci.case.contact import PairSection
 from fsci.meshes.of_case import read_rigid_side
@@ -40,7 +41,7 @@ def contact_of(case: Case, comm: MPI.Comm, names: Sequence[str], pairs: Sequence
     """Contact of pairs with the settings of a case."""
     assert case.structure is not None
     moves, c_n = case.structure.dynamics is not None, 1.0 if case.contact is None else case.contact.c_n
-    return Contact(pairs, names=names, c_n=c_n, keep_overlap=moves, comm=comm)
+    return Contact(pairs, names=names, c_n=c_n, keep_overlap=moves, periods=periods(case), comm=comm)
 
 
 def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodies | None) -> list[Pair]:

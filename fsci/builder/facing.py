@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.mesh.mesh import Mesh
+from solvers.mesh.periods import periods_before, way_of
 from solvers.mesh.tessellation import area_vectors, is_closed, tessellate
 from solvers.mesh.topology import surface_facets
 
@@ -38,6 +40,9 @@ class Face:
     @property
     def box(self) -> tuple[Array, Array]:
         return self.middles.min(axis=0), self.middles.max(axis=0)
+
+    def moved(self, way: Array) -> Face:
+        return replace(self, middles=self.middles + way)
 
 
 def face(mesh: Mesh, names: Sequence[str] | None) -> Face:
@@ -81,6 +86,15 @@ def meeting(
         sides.append(around or [face for face in own if not face.cavity])
     found = _within if anywhere else face_each_other
     return [(a, b) for a in sides[0] for b in sides[1] if found(a, b, reach)]
+
+
+def images(first: Sequence[Face], second: Sequence[Face], lengths: Array | None) -> list[list[Face]]:
+    """The second surfaces, and their images that the first ones may meet where space repeats after `lengths` [m]."""
+    if lengths is None or not first or not second:
+        return [list(second)]
+    before = periods_before(_hull(first), _hull(second), lengths)
+    around = product(*((k, k + 1) if np.isfinite(L) else (0,) for k, L in zip(before.tolist(), lengths, strict=True)))
+    return [[face.moved(way_of(periods, lengths)) for face in second] for periods in around]
 
 
 def _within(a: Face, b: Face, reach: float | None) -> bool:

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from fsci.builder.closed_faces import closed_faces
 from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.on_first import shared
+from fsci.builder.periods import periods
 from fsci.case import Case
 from fsci.case.contact import ContactSection, Friction
 from fsci.meshes.of_case import read_obstacle
 from solvers.fluid.surfaces.immersed import ImmersedBody
 from solvers.fluid.surfaces.surface import Motion
+from solvers.mesh.periods import box_of, no_periods, way_of, ways_to, without_longer
 from solvers.mesh.tessellation import tessellate
 from solvers.rigid.body import RigidBody
 from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
@@ -61,10 +63,11 @@ def build_rigid_contact(
         for index in range(len(bodies))
         for other in others
     ]
-    pairs = [pair for pair in pairs if not _overlaps(bodies, pair, t)]
+    repeat = periods(case)
+    pairs = [pair for pair in pairs if not _overlaps(bodies, pair, t, repeat)]
     restitution = 0.0 if settings is None else settings.restitution
     standoff = 0.0 if case.fluid is None else STANDOFF * float(case.fluid.grid.smallest.min())
-    return RigidContact(bodies, pairs, restitution=restitution, standoff=standoff) if pairs else None
+    return RigidContact(bodies, pairs, restitution=restitution, standoff=standoff, periods=repeat) if pairs else None
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ def _walls(case: Case) -> Iterator[RigidWall]:
         yield RigidWall(wall.name, wall.position * np.abs(normal), normal, wall.within)
 
 
-def _overlaps(bodies: Sequence[RigidBody], pair: RigidPair, t: float) -> bool:
+def _overlaps(bodies: Sequence[RigidBody], pair: RigidPair, t: float, repeat: Array | None) -> bool:
     """Whether a body lies in the other one at the start, as where a plane of symmetry cuts it."""
     body, other = bodies[pair.body], pair.other
     if isinstance(other, RigidWall):
@@ -130,7 +133,11 @@ def _overlaps(bodies: Sequence[RigidBody], pair: RigidPair, t: float) -> bool:
     points, facets = (
         (bodies[other].points, bodies[other].facets) if isinstance(other, int) else (other.at(t), other.facets)
     )
-    if (body.points.min(axis=0) > points.max(axis=0)).any() or (body.points.max(axis=0) < points.min(axis=0)).any():
-        return False
-    ways = (body.points, points[facets]), (points, body.points[body.facets])
-    return any(float(gaps(x, corners).gap.min()) < -MESH_OVERLAP * body.extent for x, corners in ways)
+    lengths = no_periods(body.dim) if repeat is None else repeat
+    lengths = without_longer(points, lengths)
+    for numbers in ways_to(box_of(body.points), box_of(points), lengths):
+        image = points + way_of(numbers, lengths)
+        ways = (body.points, image[facets]), (image, body.points[body.facets])
+        if any(float(gaps(x, corners).gap.min()) < -MESH_OVERLAP * body.extent for x, corners in ways):
+            return True
+    return False

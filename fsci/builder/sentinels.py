@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fsci.builder.closed_faces import closed_faces
 from fsci.builder.on_first import shared
+from fsci.builder.periods import periods
 from fsci.case import Case
 from fsci.meshes.of_case import read_obstacle
 from solvers.api import Sentinel
@@ -46,13 +47,15 @@ def build_sentinels(
     walls = list(closed_faces(case)) if bodies else []
     rest = [*_given(given or []), *_obstacles(case, comm)] if bodies else []
     found: dict[str, Sentinel] = {}
+    repeat = periods(case)
     if len(bodies) + len(rest) > 1:
         meetings, tied = _meetings(case, structure)
-        found["overlaps"] = Overlaps([*bodies, *rest], meetings, tied | case.joined)
+        found["overlaps"] = Overlaps([*bodies, *rest], meetings, tied | case.joined, repeat)
     if structure is not None and (len(bodies) > 1 or contact is not None):
         found["self_overlaps"] = SelfOverlaps(elastic, _with_themselves(case))
     if case.fluid is not None and bodies:
-        box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+        around = np.isfinite(repeat) if repeat is not None else np.zeros(case.fluid.grid.dimension, dtype=bool)
+        box = np.where(around, -np.inf, case.fluid.grid.start), np.where(around, np.inf, case.fluid.grid.to)
         ending = [name for name, body in case.fluid.bodies.items() if body.free and body.free.leaves == "stop"]
         found["walls"] = BoxWalls(bodies, walls, box, ending)
     if structure is not None and contact is not None:

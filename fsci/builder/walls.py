@@ -10,6 +10,7 @@ from coupling.contact_surfaces import contact_surface_of
 from coupling.near_walls import NearWalls, WallPair
 from fsci.builder.contact import contact_of
 from fsci.builder.named import named
+from fsci.builder.periods import periods
 from fsci.builder.wall_pairs import FoundWall
 from fsci.case import Case
 from fsci.case.contact import PairSection
@@ -44,4 +45,4 @@ def _pair(case: Case, bodies: Sequence[Body], found: FoundWall, masters: dict[st
     settings = PairSection.model_construct(friction=found.friction, tied=False)
     law = named(laws, settings.law)(*settings.law_parameters)
     pair = Pair(slave, masters[wall.name], law=law)
-    return WallPair(found.name, wall.said, wall.axis, wall.position, wall.inward, pair, found.embedded)
+    return WallPair(found.name, wall.said, wall.axis, wall.position, wall.inward, pair, found.embedded, periods(case))

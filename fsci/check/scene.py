@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.periods import periods
 from fsci.case import Case
 from fsci.case.contact import PairSection
 from solvers.mesh.mesh import Mesh
@@ -50,7 +51,7 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
     by_name = {body.name: body for body in bodies if body.moves or _rests(case, body.name)}
     if not any(body.moves for body in by_name.values()):
         return
-    found = Overlaps([_at_rest(body) for body in by_name.values()], {}, case.joined)
+    found = Overlaps([_at_rest(body) for body in by_name.values()], {}, case.joined, periods(case))
     found.start(case.time.start)
     for one, other, depth in found.overlapping():
         first, second = by_name[one], by_name[other]
@@ -91,7 +92,8 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
     """Bodies that move freely beyond the box or a plane of symmetry, and bodies of another unit than the box."""
     if case.fluid is None:
         return
-    low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+    low, high, repeat = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to), periods(case)
+    beside = np.isinf(repeat) if repeat is not None else np.ones(len(low), dtype=bool)  # axes along which it ends
     symmetric = [face for patch in case.fluid.patches.values() if patch.symmetry for face in patch.on]
     dry = () if case.coupling is None else case.coupling.dry_side
     for body in bodies:
@@ -100,7 +102,7 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
             yield body.keys, _sizes("the body is", ratio, "the box")
             continue
         x_low, x_high = body.box
-        outside = bool((x_high <= low).any() or (x_low >= high).any())
+        outside = bool((((x_high <= low) | (x_low >= high)) & beside).any())
         if outside and not _driven(case, body.name):
             yield body.keys, "the body is outside of the fluid's box"
         if not body.moves or outside or body.name in dry:

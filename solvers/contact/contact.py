@@ -48,6 +48,7 @@ class Contact:
     keep_overlap: for dynamics. A mean gap that is negative at the start of a step may stay, but not decrease. It occurs
     where a slave slides onto a master: a node enters the master before its area is covered. If one step closed this
     overlap, it would accelerate the node. If it stays, contact does no work. The first step closes all overlaps.
+    periods: lengths [m] after which space repeats, infinite where it does not, shape (dim,); None: nowhere.
     """
 
     def __init__(
@@ -57,11 +58,12 @@ class Contact:
         names: Sequence[str] = (),
         c_n: float = 1.0,
         keep_overlap: bool = False,
+        periods: Array | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.c_n = c_n
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
-        self.interface: ContactInterface = describe_interface(pairs)
+        self.interface: ContactInterface = describe_interface(pairs, periods)
         self.pairs, self.nodes = self.interface.pairs, self.interface.nodes
         self.multipliers = self.interface.multipliers
         self.size, self.dim = self.nodes.points.shape

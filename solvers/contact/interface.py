@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from solvers.algebra.sparse import Sparse, sparse
 from solvers.api import Array
+from solvers.contact.images import images_of
 from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.friction import FrictionBound
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
+from solvers.contact.law.tied import Tied
 from solvers.contact.mortar import FacetSearch, Mortar, join_masters
 from solvers.contact.pair import Pair
 from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
@@ -43,6 +45,7 @@ class ContactInterface:
     facets_of: dict[int, NDArray[np.int64]]  #: facets of each slave surface in numbers of its patch, by its id
     basis: Basis | None  #: basis that multipliers are dual to; None: the nodal basis (all but tri6)
     shared: NDArray[np.bool_]  #: mask of the multipliers of nodes that are on both sides of a pair, shape (C,)
+    periods: Array | None = None  #: lengths [m] after which space repeats, shape (dim,); None: it does not
 
     def nodes_of(self, surface: Surface) -> NDArray[np.int64]:
         """Numbers of the nodes of a surface among all nodes."""
@@ -88,8 +91,11 @@ class ContactInterface:
         return patch.multipliers[split], slave.facets.ravel()[first]
 
 
-def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
-    """Number nodes and multipliers of all pairs, and make the mortars of each slave surface."""
+def describe_interface(pairs: Sequence[Pair], periods: Array | None = None) -> ContactInterface:
+    """Number nodes and multipliers of all pairs, and make the mortars of each slave surface.
+
+    periods: lengths [m] after which space repeats, infinite where it does not, shape (dim,); None: nowhere.
+    """
     surfaces = _distinct([surface for pair in pairs for surface in (pair.slave, pair.master)])
     slaves = _distinct([pair.slave for pair in pairs])
     nodes = number_nodes(surfaces)
@@ -99,7 +105,7 @@ def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
     laws = _multipliers_by_law(multipliers, law_of_slave)
     mortars: list[Mortar] = []
     for k in range(len(slaves)):
-        mortars += _mortars_of(slaves, k, pairs, numbers, multipliers)
+        mortars += _mortars_of(slaves, k, pairs, numbers, multipliers, periods)
     return ContactInterface(
         pairs=tuple(pairs),
         surfaces=tuple(surfaces),
@@ -112,6 +118,7 @@ def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
         facets_of={id(slave): own for slave, own in zip(slaves, multipliers.facets_of_surface, strict=True)},
         basis=_nodal_basis(multipliers, len(nodes.points)),
         shared=_shared(slaves, pairs, numbers, multipliers),
+        periods=periods,
     )
 
 
@@ -161,6 +168,7 @@ def _mortars_of(
     pairs: Sequence[Pair],
     numbers: dict[int, NDArray[np.int64]],
     multipliers: Multipliers,
+    periods: Array | None,
 ) -> list[Mortar]:
     """The mortars of the facets of slave k that no earlier slave has, against the masters of all slaves that have them.
 
@@ -178,8 +186,10 @@ def _mortars_of(
                 if pair.integration == integration and any(pair.slave is owner for owner in owners)
             ]
             mine.sort(key=lambda i: pairs[i].master is not slaves[k])  # in self contact its own facets come first
-            masters = [pairs[i].master for i in mine]
-            for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
+            every = [(pairs[i].master, i, image) for i in mine for image in _images(pairs[i], periods)]
+            masters = [master for master, _, _ in every]
+            nodes, images = [numbers[id(master)] for master in masters], [image for _, _, image in every]
+            for joined in join_masters(masters, nodes, [i for _, i, _ in every], images):
                 search: FacetSearch
                 if masters[0] is slaves[k] and mine[0] in joined.pair:
                     own = len(part.facets)
@@ -189,8 +199,13 @@ def _mortars_of(
                     if len(np.intersect1d(patch.nodes[part.facets], joined.nodes)):
                         search = SearchApart(search, patch.nodes[part.facets], joined.nodes[joined.facets])
                 deep = part.deep_facets(joined, pairs)
-                found.append(Mortar(patch, part.facets, edge, joined, integration, search, deep))
+                found.append(Mortar(patch, part.facets, edge, joined, integration, search, deep, periods))
     return found
+
+
+def _images(pair: Pair, periods: Array | None) -> list[tuple[int, ...]]:
+    """Numbers of the images of a master; ties are between surfaces as meshed."""
+    return images_of(pair.slave, pair.master, None if pair.law == Tied() else periods)
 
 
 def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from solvers.algebra.sparse import Sparse, nothing, sparse, stack
 from solvers.api import Array
 from solvers.contact.blocks import expand
+from solvers.contact.images import ALONE, ways
 from solvers.contact.patch import SlavePatch
 from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
@@ -50,18 +51,22 @@ class Masters:
     nodes: NDArray[np.int64]  #: among all nodes, shape (nm,)
     pair: NDArray[np.int64]  #: pair that each node belongs to, shape (nm,)
     pair_of_facet: NDArray[np.int64]  #: shape (k,)
+    image: NDArray[np.int64]  #: number of the image of each node, see `solvers.contact.images`, shape (nm, dim)
 
 
 def join_masters(
-    surfaces: Sequence[Surface], nodes: Sequence[NDArray[np.int64]], pairs: Sequence[int]
+    surfaces: Sequence[Surface],
+    nodes: Sequence[NDArray[np.int64]],
+    pairs: Sequence[int],
+    images: Sequence[tuple[int, ...]],
 ) -> list[Masters]:
     """Join masters by type of facet; triangles beside quadrilaterals become degenerate quadrilaterals."""
     kinds = {surface.facet_type for surface in surfaces}
     as_quads = {"triangle", "quad"} <= kinds
     found = []
     for kind in sorted(kinds - {"triangle"} if as_quads else kinds):
-        facets, numbers, owner, of_facet, first = [], [], [], [], 0
-        for surface, number, pair in zip(surfaces, nodes, pairs, strict=True):
+        facets, numbers, owner, of_facet, numbered, first = [], [], [], [], [], 0
+        for surface, number, pair, image in zip(surfaces, nodes, pairs, images, strict=True):
             widen = as_quads and kind == "quad" and surface.facet_type == "triangle"
             if surface.facet_type != kind and not widen:
                 continue
@@ -69,9 +74,10 @@ def join_masters(
             numbers.append(number)
             owner.append(np.full(len(number), pair))
             of_facet.append(np.full(len(surface.facets), pair))
+            numbered.append(np.tile(image, (len(number), 1)))
             first += len(number)
         joined = np.ascontiguousarray(np.concatenate(facets), dtype=np.int64)
-        found.append(Masters(joined, kind, *map(np.concatenate, (numbers, owner, of_facet))))
+        found.append(Masters(joined, kind, *map(np.concatenate, (numbers, owner, of_facet, numbered))))
     return found
 
 
@@ -106,8 +112,14 @@ class Mortar:
         integration: Integration,
         search: FacetSearch,
         deep: NDArray[np.int32] | None = None,
+        periods: Array | None = None,
     ):
-        """deep: facets that lie deep in each other's body at the start, see `overlap_at_start`, shape (p, 2)."""
+        """deep: facets that lie deep in each other's body at the start, see `overlap_at_start`, shape (p, 2).
+
+        periods: lengths [m] after which space repeats, shape (dim,); None: it does not.
+        """
+        self._periods = periods if (masters.image != ALONE).any() else None
+        self.way = np.zeros(masters.image.shape)  #: from the nodes of the masters to their images in this step [m]
         self.patch, self.masters, self.integration = patch, masters, integration
         self.search = search
         self._types = CELL_TYPES[patch.facet_type].kernel, CELL_TYPES[masters.facet_type].kernel
@@ -123,6 +135,7 @@ class Mortar:
     def start(self, x: Array) -> None:
         """Keep the facet pairs that lie deep in each other at the start; x: positions [m] of all nodes, (N, dim)."""
         self.clear_until = -np.inf
+        self._place_images(x)
         if len(self._deep):
             self._first = [x[nodes] for nodes in (self.patch.nodes, self.masters.nodes)]
             self._kept = self._deep
@@ -133,10 +146,20 @@ class Mortar:
         x: positions [m] of all nodes, (N, dim); active: mask of the multipliers in contact, (C,).
         """
         self._evaluations = 0
+        self._place_images(x)
         sides = (self.patch.nodes, self.masters.nodes)
         same = all(np.array_equal(x[nodes], first) for nodes, first in zip(sides, self._first, strict=False))
         self._kept = self._deep if same else np.empty(0, dtype=np.int64)
         self.search.begin_step(active[self.patch.multipliers][self.facets].sum(axis=1))
+
+    def _place_images(self, x: Array) -> None:
+        if self._periods is not None:
+            slave, masters = x[self.patch.nodes[self.facets].ravel()], self.masters
+            self.way = ways(slave, x[masters.nodes], masters.pair, masters.image, self._periods)
+
+    def _at_masters(self, x: Array) -> Array:
+        """Positions [m] of the nodes of the masters, or of their images, from those of all nodes."""
+        return x[self.masters.nodes] if self._periods is None else x[self.masters.nodes] + self.way
 
     def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
         """One number for each facet pair, increasing with the pairs."""
@@ -169,7 +192,8 @@ class Mortar:
         slave, master = self.patch.nodes, self.masters.nodes
         ways = (np.linalg.norm(x[nodes] - x_previous[nodes], axis=1) for nodes in (slave, master))
         motion = max(float(way.max(initial=0.0)) for way in ways) + max(self.interference, 0.0) + beyond
-        found = self.search.pairs(x[slave], x[master], self.edge + motion, x_previous[slave], x_previous[master])
+        at_masters = self._at_masters(x), self._at_masters(x_previous)
+        found = self.search.pairs(x[slave], at_masters[0], self.edge + motion, x_previous[slave], at_masters[1])
         self.clear_until = travel + (self.search.clearance - (self.edge - beyond)) / 4.0
         codes = self._codes(found)
         if len(self._kept) == 0 or np.isin(self._kept, codes).all():
@@ -211,7 +235,7 @@ class Mortar:
         )
 
     def _kernel(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32], **settings: Any) -> MortarResult:
-        slave, master = (np.ascontiguousarray(x[nodes]) for nodes in (self.patch.nodes, self.masters.nodes))
+        slave, master = np.ascontiguousarray(x[self.patch.nodes]), np.ascontiguousarray(self._at_masters(x))
         surfaces = slave, self.facets, self._types[0], master, self.masters.facets, self._types[1]
         return mortar(*surfaces, normals, facet_pairs, method=self.integration, **settings)
 

@@ -15,6 +15,7 @@ from solvers.contact.law.tied import Tied
 from solvers.contact.surface import Surface
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.distance import distances_in_pairs
+from solvers.mesh.periods import box_of, gap_of_boxes, no_periods, way_of, ways_to, without_longer
 from solvers.mesh.search import Search
 
 #: A step could bring together surfaces whose distance is at most this multiple of their ways by velocity, plus this
@@ -28,6 +29,7 @@ class Reach:
 
     def __init__(self, interface: ContactInterface):
         self._surfaces = interface.nodes.of_surface
+        self._periods = no_periods(interface.nodes.dim) if interface.periods is None else interface.periods
         self._sides = np.array(
             [[_index(interface, side) for side in (pair.slave, pair.master)] for pair in interface.pairs]
         ).reshape(-1, 2)
@@ -53,7 +55,7 @@ class Reach:
         distance = (WAYS * way + EDGES * self._edges) * np.where(present, 2.0, 1.0)
         low, high = (np.array([end(x[nodes], axis=0) for nodes in self._surfaces]) for end in (np.min, np.max))
         slave, master = self._sides.T
-        apart = np.maximum(low[slave] - high[master], low[master] - high[slave]).max(axis=1, initial=-np.inf)
+        apart = gap_of_boxes((low[slave], high[slave]), (low[master], high[master]), self._periods)
         touching = present & np.array([pressed[self._surfaces[side]].any() for side in slave], dtype=bool)
         found = ~self._comes | touching | (apart <= distance)
         for pair in np.flatnonzero(found & self._comes & ~touching):
@@ -90,8 +92,14 @@ class Reach:
         if known is None or known[2] < distance or not (np.array_equal(known[0], xs) and np.array_equal(known[1], xm)):
             if pair not in self._searches:
                 self._searches[pair] = Search(*(self._facets[side] for side in sides))
-            candidates = self._searches[pair].pairs(xs, xm, distance)
-            known = xs, xm, distance, candidates, self._distances(sides, candidates, xs, xm)
+            parts = []
+            for periods in ways_to(box_of(xs), box_of(xm), without_longer(xm, self._periods), distance):
+                image = xm + way_of(periods, self._periods)
+                candidates = self._searches[pair].pairs(xs, image, distance)
+                parts.append((candidates, self._distances(sides, candidates, xs, image)))
+            none = np.empty((0, 2), dtype=np.int32), np.empty(0)
+            candidates, distances = (np.concatenate(some) for some in zip(none, *parts, strict=True))
+            known = xs, xm, distance, candidates, distances
             self._latest[pair] = known
         return known[3][known[4] <= distance]
 

@@ -31,6 +31,7 @@ class Beginning:
 
     difference: Sparse  #: (W^n, -M^n) over all nodes, shape (C, N)
     slopes: Sparse  #: `difference` for all components, shape (dim * C, dim * N)
+    offset: Array  #: -M^n times the ways of images of masters, shape (C, dim)
     D: Array  #: shape (C,)
     covered: Array  #: int N_j where the masters of each pair cover the slave, for laws by pair, shape (C, pairs)
 
@@ -72,9 +73,10 @@ class Sliding:
         (N, dim, pairs), C = self._shape, self._count
         if all(travel < mortar.clear_until for mortar in self.mortars):
             # all integrals are zero; other pairs, or these by a long step, may still meet
-            self._beginning = Beginning(nothing((C, N)), nothing((dim * C, dim * N)), np.zeros(C), np.zeros((C, pairs)))
+            none = nothing((C, N)), nothing((dim * C, dim * N))
+            self._beginning = Beginning(*none, np.zeros((C, dim)), np.zeros(C), np.zeros((C, pairs)))
             return
-        D, covered, parts = np.zeros(C), np.zeros((C, pairs)), []
+        D, covered, offset, parts = np.zeros(C), np.zeros((C, pairs)), np.zeros((C, dim)), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):
             facet_pairs, _ = mortar.near(x, x, travel, beyond=mortar.edge)
@@ -85,13 +87,14 @@ class Sliding:
             found, W, M = mortar.begin(x, at_nodes, facet_pairs)
             rows = mortar.patch.multipliers
             D[rows] += found
+            offset[rows] -= M @ mortar.way
             if any(mortar is one for one in self._by_pair):
                 pair_of = mortar.masters.pair_of_facet[facet_pairs[:, 1]]
                 for pair in np.unique(pair_of):
                     covered[rows, pair] += mortar.covered(x, at_nodes, facet_pairs[pair_of == pair])
             parts += [(W, rows, mortar.patch.nodes), (-M, rows, mortar.masters.nodes)]
-        D, covered, difference = self._shares.total_of(D, covered, add_up(parts, (C, N)))
-        self._beginning = Beginning(difference, expand(difference, dim), D, covered)
+        D, covered, offset, difference = self._shares.total_of(D, covered, offset, add_up(parts, (C, N)))
+        self._beginning = Beginning(difference, expand(difference, dim), offset, D, covered)
 
     def evaluate(
         self,
@@ -116,7 +119,7 @@ class Sliding:
         D = redistributed(self._beginning.D)
         defined = D > 0.0
         share = np.divide(1.0, D, out=np.zeros_like(D), where=defined)
-        values = share[:, None] * redistributed(self._beginning.difference @ x + gap)
+        values = share[:, None] * redistributed(self._beginning.difference @ x + self._beginning.offset + gap)
         slopes = redistributed(self._beginning.slopes + dgap).scaled_rows(share.repeat(dim))
         covered = redistributed(self._beginning.covered)
         total = covered.sum(axis=1, keepdims=True)

@@ -48,9 +48,14 @@ class RigidContact:
         *,
         restitution: float = 0.0,
         standoff: float = 0.0,
+        periods: Array | None = None,
     ):
-        """standoff: gap [m] that contact leaves open, so that a flow between the bodies stays connected."""
+        """standoff: gap [m] that contact leaves open, so that a flow between the bodies stays connected.
+
+        periods: lengths [m] after which space repeats, infinite where it does not, shape (dim,); None: nowhere.
+        """
         self.bodies, self.pairs, self.restitution, self.standoff = list(bodies), list(pairs), restitution, standoff
+        self._periods = periods
         self._starts = np.cumsum([0] + [vertices(bodies, pair) for pair in pairs]).tolist()
         self._unknowns = len(bodies) * (3 if bodies[0].dim == 2 else 6)
         self._moment: Moment | None = None
@@ -94,7 +99,7 @@ class RigidContact:
     def touching(self) -> NDArray[np.bool_]:
         """Mask of the vertices in contact, of all pairs: those of the body, then those of the other side."""
         found = np.zeros(self._starts[-1], dtype=bool)
-        found[self.near.vertex[self.active]] = True
+        found[self.near.vertex[self.active] % len(found)] = True
         return found
 
     def measure(self, moment: Moment, components: NDArray[np.int64], free: NDArray[np.bool_]) -> None:
@@ -103,7 +108,8 @@ class RigidContact:
         components: the unknowns of a body among `COMPONENTS`; free: mask of the unknowns that are not held.
         """
         self._moment, self._components = moment, components
-        self.near = search(self.pairs, self._starts, moment, self.near if self._measured >= KEPT else None)
+        kept = self.near if self._measured >= KEPT else None
+        self.near = search(self.pairs, self._starts, moment, kept, self._periods)
         self._measured += 1
         self.touch = self.near.touch(moment, components, free)
         self.z = np.zeros_like(self.near.x)

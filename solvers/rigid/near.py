@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.mesh.periods import gap_of_boxes, no_periods, way_of, ways_to, without_longer
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.coulomb import Touch
 from solvers.rigid.gaps import Gaps, RigidWall, gaps, unit_normals
@@ -24,6 +25,10 @@ NEAR_BODY = 0.25
 #: the first one has the velocities of the step before. Another body that is hit is seen in the next iterate. From 0.01
 #: to 0.25 piles of discs move alike, in as many iterations; with 0.25 a step costs a third more.
 NEAR_BOXES = 0.05
+
+
+#: Images along an axis that have numbers of their own, those of both directions.
+IMAGES = 2**12
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,7 @@ class _Side:
     x: Array  #: positions of the vertices [m], shape (n, dim)
     facets: NDArray[np.int64]
     moved: Array | None  #: displacements of the vertices of an obstacle in the step [m]; None: it rests, or is a body
+    way: Array | None = None  #: by whole periods, of an image [m], shape (dim,)
 
     @cached_property
     def extent(self) -> float:
@@ -98,6 +104,10 @@ class _Side:
             np.add.at(found, corner, normals)
         return found
 
+    def image(self, way: Array) -> _Side:
+        """The image some periods further."""
+        return replace(self, x=self.x + way, way=way) if way.any() else self
+
 
 @dataclass(frozen=True)
 class Near:
@@ -105,6 +115,7 @@ class Near:
 
     vertex: NDArray[np.int64]  #: numbers among those of all pairs
     body: NDArray[np.int64]  #: indices of the bodies of the vertex and of the surface, -1: none, shape (m, 2)
+    way: Array  #: by whole periods, from the surface to its image that the vertex is near [m], shape (m, dim)
     gap: Array  #: [m]
     frame: Array  #: unit vectors, shape (m, dim, dim)
     x: Array  #: positions of the vertices [m], shape (m, dim)
@@ -120,7 +131,8 @@ class Near:
             vectors, ones = np.empty((0, dim)), np.empty(0)
             numbers = np.empty(0, dtype=np.int64)
             frame = np.empty((0, dim, dim))
-            return cls(numbers, numbers.reshape(0, 2), ones, frame, vectors, vectors, vectors, ones, numbers)
+            pairs = numbers.reshape(0, 2)
+            return cls(numbers, pairs, vectors, ones, frame, vectors, vectors, vectors, ones, numbers)
         return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
 
     def __getitem__(self, which: NDArray) -> Near:
@@ -129,7 +141,7 @@ class Near:
     def arms(self, moment: Moment) -> Array:
         """Vectors from the centres of both bodies to the vertex and to its foot [m], shape (m, 2, 3)."""
         centres = np.array([moment.centre(index) for index in range(len(moment.bodies))])
-        ends = np.stack([self.x, self.x - self.gap[:, None] * self.frame[:, 0]], axis=1)
+        ends = np.stack([self.x, self.x - self.gap[:, None] * self.frame[:, 0] - self.way], axis=1)
         found = ends - centres[np.maximum(self.body, 0)]
         return np.pad(found, ((0, 0), (0, 0), (0, 3 - found.shape[2])))
 
@@ -155,10 +167,17 @@ def vertices(bodies: Sequence[RigidBody], pair: RigidPair) -> int:
     return count + len(bodies[other].points if isinstance(other, int) else other.points)
 
 
-def search(pairs: Sequence[RigidPair], starts: Sequence[int], moment: Moment, kept: Near | None = None) -> Near:
-    """All vertices that are near; starts: number of the first vertex of each pair.
+def search(
+    pairs: Sequence[RigidPair],
+    starts: Sequence[int],
+    moment: Moment,
+    kept: Near | None = None,
+    lengths: Array | None = None,
+) -> Near:
+    """All vertices that are near; starts: number of the first vertex of each pair, then of all vertices.
 
-    kept: vertices that it has keep their facets there, whose planes they face.
+    kept: vertices that it has keep their facets there, whose planes they face. lengths: periods [m], None: no space
+    repeats. Beside an image of a surface, a vertex has another number: see `image_number`.
     """
     x = positions(moment.bodies, moment.now)
     low, high = (np.array([getattr(own, end)(axis=0) for own in x]) for end in ("min", "max"))
@@ -166,8 +185,9 @@ def search(pairs: Sequence[RigidPair], starts: Sequence[int], moment: Moment, ke
     obstacles = {id(pair.other): pair.other for pair in pairs if isinstance(pair.other, Obstacle)}
     beside_all = {key: _side(obstacle, moment) for key, obstacle in obstacles.items()}
     sides = [_Side(index, at, moment.bodies[index].facets, None) for index, at in enumerate(x)]
-    for number in _near_pairs(pairs, low, high, beside_all):
-        pair, start = pairs[number], starts[number]
+    lengths = no_periods(x[0].shape[1]) if lengths is None else lengths
+    for number, periods in _near_pairs(pairs, low, high, beside_all, lengths):
+        pair, start = pairs[number], starts[number] + starts[-1] * image_number(periods)
         body, other = pair.body, pair.other
         own = sides[body]
         if isinstance(other, RigidWall):
@@ -176,32 +196,48 @@ def search(pairs: Sequence[RigidPair], starts: Sequence[int], moment: Moment, ke
             at = Gaps(at.gap[close], at.normal[close], close)
             found.append(_near(start + close, own, close, at, None, pair.friction, moment))
             continue
-        beside = sides[other] if isinstance(other, int) else beside_all[id(other)]
-        for first, points, surface in ((start, own, beside), (start + len(own.x), beside, own)):
+        beside, way = sides[other] if isinstance(other, int) else beside_all[id(other)], way_of(periods, lengths)
+        for first, points, surface in (
+            (start, own, beside.image(way)),
+            (start + len(own.x), beside, own.image(-way)),
+        ):
             found += _vertices_near(first, points, surface, pair.friction, moment, kept)
     return Near.joined(found, x[0].shape[1])
 
 
-def _near_pairs(pairs: Sequence[RigidPair], low: Array, high: Array, obstacles: Mapping[int, _Side]) -> Iterator[int]:
-    """Numbers of the pairs whose boxes are near each other; obstacles: by their ids."""
+def image_number(periods: Sequence[int]) -> int:
+    """One number for each image, zero for the surface itself."""
+    return sum((k % IMAGES) * IMAGES**axis for axis, k in enumerate(periods))
+
+
+def _near_pairs(
+    pairs: Sequence[RigidPair], low: Array, high: Array, obstacles: Mapping[int, _Side], lengths: Array
+) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """Numbers of the pairs whose boxes are near each other, and the periods between them; obstacles: by their ids."""
     extents = (high - low).max(axis=1)
     both = np.array([(number, p.body, p.other) for number, p in enumerate(pairs) if isinstance(p.other, int)])
     apart = np.zeros(len(pairs), dtype=bool)
     if len(both):
         number, one, other = both.T
-        margin = NEAR_BOXES * np.minimum(extents[one], extents[other])[:, None]
-        apart[number] = ((low[one] > high[other] + margin) | (low[other] > high[one] + margin)).any(axis=1)
+        margin = NEAR_BOXES * np.minimum(extents[one], extents[other])
+        apart[number] = gap_of_boxes((low[one], high[one]), (low[other], high[other]), lengths) > margin
+    here = (0,) * low.shape[1]
     for index in np.flatnonzero(~apart):
         wall, body = pairs[index].other, pairs[index].body
-        if isinstance(wall, Obstacle):
-            (first, last), margin = obstacles[id(wall)].box, NEAR_BODY * extents[body]
-            if (low[body] > last + margin).any() or (high[body] < first - margin).any():
-                continue
+        box = low[body], high[body]
         if isinstance(wall, RigidWall):
-            nearest = np.where(wall.normal > 0.0, low[body], high[body])
-            if not (nearest - wall.at) @ wall.normal < NEAR_BODY * extents[body]:
-                continue
-        yield int(index)
+            nearest = np.where(wall.normal > 0.0, *box)
+            if (nearest - wall.at) @ wall.normal < NEAR_BODY * extents[body]:
+                yield int(index), here
+        elif isinstance(wall, Obstacle):
+            side = obstacles[id(wall)]
+            repeated = without_longer(side.x, lengths)
+            for periods in ways_to(box, side.box, repeated, NEAR_BODY * float(extents[body])):
+                yield int(index), periods
+        else:
+            margin = NEAR_BOXES * float(min(extents[body], extents[wall]))
+            for periods in ways_to(box, (low[wall], high[wall]), lengths, margin):
+                yield int(index), periods
 
 
 def _side(obstacle: Obstacle, moment: Moment) -> _Side:
@@ -259,11 +295,12 @@ def _near(
     carried = given.copy()
     if points.body >= 0:
         carried += moment.carried(points.body, x)
+    way = np.zeros_like(x) if surface is None or surface.way is None else np.tile(surface.way, (len(x), 1))
     if surface is not None and surface.body >= 0:
-        carried -= moment.carried(surface.body, foot)
+        carried -= moment.carried(surface.body, foot - way)
     body = np.tile([points.body, -1 if surface is None else surface.body], (len(x), 1))
     friction_of = np.full(len(x), friction)
-    return Near(vertex, body, at.gap, _frames(at.normal), x, carried, given, friction_of, at.facet)
+    return Near(vertex, body, way, at.gap, _frames(at.normal), x, carried, given, friction_of, at.facet)
 
 
 def _frames(normals: Array) -> Array:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, FailureKind, Finding, State
 from solvers.mesh.penetration import depths, inside
+from solvers.mesh.periods import box_of, gap_of_boxes, no_periods, way_of, ways_to, without_longer
 from solvers.mesh.search import Search
 from solvers.sentinels.bodies import LEFT_BETWEEN, Measures, MovingBody, arc_height
 
@@ -68,9 +69,17 @@ class Overlaps:
     """
 
     def __init__(
-        self, bodies: Sequence[MovingBody], meetings: Mapping[frozenset[str], Meeting], tied: set[frozenset[str]]
+        self,
+        bodies: Sequence[MovingBody],
+        meetings: Mapping[frozenset[str], Meeting],
+        tied: set[frozenset[str]],
+        periods: Array | None = None,
     ):
-        """meetings: by the names of both bodies; tied: bodies that are tied to each other."""
+        """meetings: by the names of both bodies; tied: bodies that are tied to each other.
+
+        periods: lengths [m] after which space repeats, see `solvers.mesh.periods`; None: it does not.
+        """
+        self._periods = periods
         self._bodies, self._meetings = list(bodies), dict(meetings)
         self._pairs = [
             (i, j)
@@ -99,20 +108,39 @@ class Overlaps:
     def look(self, t: float, dt: float) -> list[Finding]:
         """Overlaps at the end t [s] of a step, and passages within it."""
         now, before = self._positions(t), self._before
-        overlapping = {pair: finding for pair in self._near(now, now) if (finding := self._overlap(*pair, now))}
-        passed = [self._passage(*pair, before, now) for pair in self._near(before, now) if pair not in overlapping]
+        overlapping: dict[tuple[int, int], Finding] = {}
+        for i, j, way in self._near(now, now):
+            if (i, j) not in overlapping and (finding := self._overlap(i, j, _with_image(now, j, way))):
+                overlapping[i, j] = finding
+        passed = [
+            self._passage(i, j, _with_image(before, j, way), _with_image(now, j, way))
+            for i, j, way in self._near(before, now)
+            if (i, j) not in overlapping
+        ]
         self._before, self._time = now, t
         return [*overlapping.values(), *(finding for finding in passed if finding)]
 
-    def _near(self, before: Sequence[Array], now: Sequence[Array]) -> Iterator[tuple[int, int]]:
-        """Pairs of bodies whose boxes over the step overlap."""
+    def _near(self, before: Sequence[Array], now: Sequence[Array]) -> Iterator[tuple[int, int, Array]]:
+        """Pairs of bodies whose boxes over the step overlap, and the way [m] of the second one's image that is met."""
         if not self._pairs:
             return
         low = np.array([np.minimum(a.min(axis=0), b.min(axis=0)) for a, b in zip(before, now, strict=True)])
         high = np.array([np.maximum(a.max(axis=0), b.max(axis=0)) for a, b in zip(before, now, strict=True)])
         i, j = np.array(self._pairs).T
-        near = ((low[i] < high[j]) & (low[j] < high[i])).all(axis=1)
-        yield from (self._pairs[k] for k in np.flatnonzero(near))
+        if self._periods is None:
+            near = ((low[i] < high[j]) & (low[j] < high[i])).all(axis=1)
+            yield from ((*self._pairs[k], np.zeros(low.shape[1])) for k in np.flatnonzero(near))
+            return
+        near = gap_of_boxes((low[i], high[i]), (low[j], high[j]), self._periods) < 0.0
+        for one, other in (self._pairs[k] for k in np.flatnonzero(near)):
+            for way in self._ways((low[one], high[one]), (low[other], high[other])):
+                yield one, other, way
+
+    def _ways(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> Iterator[Array]:
+        """Ways [m] to the images whose boxes overlap that of the first one; a body longer than a period has none."""
+        lengths = no_periods(len(one[0])) if self._periods is None else self._periods
+        lengths = without_longer(np.stack(other), lengths)
+        yield from (way_of(periods, lengths) for periods in ways_to(one, other, lengths))
 
     # ------------------------------------------------------------------------------------------------------ overlaps
 
@@ -144,15 +172,17 @@ class Overlaps:
 
     def overlapping(self) -> Iterator[tuple[str, str, float]]:
         """(name, name, depth [m]) of bodies that overlap at the start, also where one is whole in the other."""
-        for i, j in self._near(self._start, self._start):
+        for i, j in dict.fromkeys((i, j) for i, j, _ in self._near(self._start, self._start)):
             if (depth := self._at_start(i, j)) > 0.0:
                 yield self._bodies[i].name, self._bodies[j].name, depth
 
     def _at_start(self, i: int, j: int) -> float:
         """Depth [m] by which two bodies overlap at the start."""
         every = {k: np.arange(len(self._bodies[k].facets)) for k in (i, j)}
-        ways = ((i, j), (j, i))
-        return max(self._deep(a, b, self._start, every[a], every[b], at_start=True) for a, b in ways)[0]
+        images = [_with_image(self._start, j, way) for way in self._ways(*(box_of(self._start[k]) for k in (i, j)))]
+        ways = product(((i, j), (j, i)), images)
+        found = [self._deep(a, b, x, every[a], every[b], at_start=True) for (a, b), x in ways]
+        return max(found, default=NOT_AT_ALL)[0]
 
     def _deep(
         self,
@@ -189,8 +219,10 @@ class Overlaps:
             depth[depth <= tolerance] = 0.0
         if not at_start:
             deep = np.flatnonzero(depth)
-            first = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
-            began = inside(samples.at(chosen[deep], first[0]), first[1])
+            first = samples.at(chosen[deep], self._start[a][self._bodies[a].facets])
+            began = np.zeros(len(deep), dtype=bool)
+            for way in self._ways(*(box_of(self._start[k]) for k in (a, b))):
+                began |= inside(first, (self._start[b] + way)[self._bodies[b].facets])
             depth[deep[began & ~samples.paired[chosen[deep]]]] = 0.0
         k = int(depth.argmax())
         edge = min(self._measures[a].edge[facet[k]], self._measures[b].edge[near].min())
@@ -281,6 +313,11 @@ class Overlaps:
         """Continue with bodies that have been restored already."""
         self._time = state["time"]
         self._before = self._positions(self._time)
+
+
+def _with_image(x: Sequence[Array], body: int, way: Array) -> list[Array]:
+    """Positions [m] of all bodies, with those of an image of one of them."""
+    return [own + way if index == body and way.any() else own for index, own in enumerate(x)]
 
 
 def lattice(sizes: Array, corners: int) -> tuple[NDArray[np.int64], Array]:

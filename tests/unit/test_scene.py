@@ -88,6 +88,32 @@ def test_bodies_that_overlap():
     assert warnings(TWO + PAIR) == ([], [f"case.yaml:8:5: {words}"])
 
 
+ACROSS = """\
+time: {step: 1, end: 1}
+fluid:
+  density: 1
+  viscosity: 1
+  grid: {from: [0, 0], to: [2, 1], cells: [16, 8]}
+  patches: {ends: {on: [x-, x+], periodic: true}, walls: {on: [y-, y+], no_slip: true}}
+  bodies:
+    left: {mesh: {shape: rectangle, size: [0.5, 0.5], cells: [2, 2], origin: [-0.1, 0.2]}, free: {density: 2}}
+    right: {mesh: {shape: rectangle, size: [0.5, 0.5], cells: [2, 2], origin: [X, 0.2]}, free: {density: 2}}
+coupling: {}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+@pytest.mark.parametrize("x", [1.5, -2.5, 5.5])
+def test_bodies_that_overlap_through_a_periodic_face(x):
+    """In any period; a body that is beyond the end of the box is not outside of it."""
+    words = "move one of them: they have no contact"
+    said, _ = warnings(ACROSS.replace("X", str(x)))
+    placed = [line for line in said if "overlap" in line or "outside" in line]
+    assert placed == [f"case.yaml:9:12: bodies 'left' and 'right' overlap, 0.1 m deep: {words}"]
+    said, _ = warnings(ACROSS.replace("X", str(x - 0.2)))
+    assert not [line for line in said if "overlap" in line or "outside" in line]
+
+
 @pytest.mark.usefixtures("in_new_folder")
 def test_a_free_body_in_a_given_one():
     """Contact leaves them out, so that the case should not begin like this; two given bodies may overlap."""

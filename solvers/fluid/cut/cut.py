@@ -294,7 +294,7 @@ class Cutter:
             None,
             facets,
             motion,
-            Images(facets, motion.x, nothing, nothing, nothing),
+            Images(facets, motion.x, nothing, nothing),
         )
 
     def _film(self, motion: Motion, facets, moments, normal, cells, solid) -> Array | None:

@@ -29,7 +29,6 @@ class Images:
     x: Array  #: positions of their vertices [m], shape (n, dim)
     facet: Indices  #: number of each facet among those of the surfaces, shape (m,)
     vertex: Indices  #: number of each vertex among those of the surfaces, shape (n,)
-    group: Indices  #: of the facets that have moved by the same periods, from 0 on, shape (m,)
 
     def motion(self, motion: Motion) -> Motion:
         """The motion of the images, from that of the surfaces."""
@@ -78,15 +77,15 @@ class Periods:
 
         Raises StepFailed if a part of a surface is as long as the period: it would meet its own image.
         """
-        every = np.arange(len(facets)), np.arange(len(x)), np.zeros(len(facets), dtype=np.int64)
+        every = np.arange(len(facets)), np.arange(len(x))
         if not self.axes or not len(facets):
             return Images(facets, x, *every)
         shifts = self._shifts(facets, x, layers)
         if list(shifts) == [(0,) * len(self.axes)] and shifts[(0,) * len(self.axes)].all():
             return Images(facets, x, *every)
         parts, places, count = [facets[:0]], [x[:0]], 0
-        facet, vertex, group = ([some[:0]] for some in every)
-        for number, (shift, those) in enumerate(shifts.items()):
+        facet, vertex = ([some[:0]] for some in every)
+        for shift, those in shifts.items():
             used, corners = np.unique(facets[those], return_inverse=True)
             way = np.zeros(x.shape[1])
             way[list(self.axes)] = np.array(shift) * self.lengths[list(self.axes)]
@@ -94,9 +93,8 @@ class Periods:
             places.append(x[used] + way)
             facet.append(np.flatnonzero(those))
             vertex.append(used)
-            group.append(np.full(int(those.sum()), number))
             count += len(used)
-        return Images(*(np.concatenate(some) for some in (parts, places, facet, vertex, group)))
+        return Images(*(np.concatenate(some) for some in (parts, places, facet, vertex)))
 
     def _shifts(self, facets: NDArray[np.int64], x: Array, layers: int) -> dict[tuple[int, ...], NDArray[np.bool_]]:
         """Masks of the facets that have an image in the box, by its distance in periods."""

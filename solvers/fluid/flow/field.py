@@ -26,7 +26,6 @@ from solvers.fluid.flow.change_of_forces import ChangeOfForces
 from solvers.fluid.flow.discretisation import Discretisation
 from solvers.fluid.flow.flow_iterate import FlowIterate
 from solvers.fluid.flow.history import History
-from solvers.fluid.flow.meeting import require_apart
 from solvers.fluid.flow.moving_bodies import MovingBodies
 from solvers.fluid.flow.on_cells import FlowOnCells
 from solvers.fluid.flow.thin_bodies import Began
@@ -266,7 +265,6 @@ class Fluid:
             facets, motion = self.moving.move(coupled, self.current.t)
             self._follow_sheets(facets, motion)
             cut = self._cut(facets, motion)
-            require_apart(self.bodies, cut.images)
         with self.timer("weights"):
             self.system.set_cut(cut)
             self.system.sweep_velocity = self.moving.sweep.velocity(facets, motion.x, motion.v, self.difference)
