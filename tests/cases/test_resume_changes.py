@@ -21,7 +21,7 @@ structure:
   dynamics: {rho_inf: 1}
   bodies:
     beam:
-      mesh: {shape: rectangle, size: [1, 0.2], cells: [8, 2]}
+      mesh: {shape: rectangle, size: [1, 0.2], cells: [8, 2], order: 1}
       material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3, density: 1}
       supports: [{on: left, displacement: [0, 0]}]
       gravity: [0, "10*f(t)"]
@@ -197,7 +197,7 @@ def test_another_mesh_of_the_same_file(tmp_path, capfd):
 
     write(tmp_path, 1.0)
     (tmp_path / "case.yaml").write_text(
-        BEAM.replace("{shape: rectangle, size: [1, 0.2], cells: [8, 2]}", "{file: m.inp}")
+        BEAM.replace("{shape: rectangle, size: [1, 0.2], cells: [8, 2], order: 1}", "{file: m.inp}")
     )
     (tmp_path / "f.csv").write_text("0, -1\n1, -1\n")
     out = tmp_path / "out"
