@@ -57,10 +57,10 @@ def test_a_membrane_from_a_line(scale):
     points = scale * np.stack([1.0 + 0.02 * np.sin(np.pi * y), y, 0.0 * y], axis=1)
     meshio.Mesh(points, [("line", np.stack([np.arange(20), np.arange(1, 21)], axis=1))]).write("skin.vtk")
     text = WALL.replace(
-        "{shape: rectangle, size: [0.5, 1], cells: [4, 8], origin: [1, 0]}", "{file: skin.vtk, thickness: T}"
+        "{shape: rectangle, size: [0.5, 1], cells: [4, 8], origin: [1, 0]}", "{file: skin.vtk, thickness: T, order: 1}"
     )
     text = (
-        text.replace("T}", f"{0.01 * scale}}}")
+        text.replace("T,", f"{0.01 * scale},")
         .replace("[2, 1]", f"[{2 * scale}, {scale}]")
         .replace("[top, bottom]", "edge")
     )
