@@ -101,7 +101,7 @@ def test_a_ring_that_is_squeezed_by_its_data_is_found():
     assert found.value == pytest.approx(0.99**2 - 1, rel=1e-9)
     assert found.where == pytest.approx((0.0, 0.0), abs=1e-9)
     assert "closed pocket 1 of the fluid, around (" in found.message
-    assert "has 0.76977 m^2 instead of 0.7854 since it closed at t = 0 (-1.99%)" in found.message
+    assert "has 0.76977 [volume] instead of 0.7854 since it closed at t = 0 (-1.99%)" in found.message
 
 
 def test_a_process_whose_cells_are_all_solid():
