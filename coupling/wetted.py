@@ -12,7 +12,7 @@ from coupling.contact_surfaces import global_dofs
 from coupling.divided_facets import divide_facets
 from coupling.ties import Tie, candidate_facets, join_vertices, tied_sides
 from solvers.algebra.blocks import Layout
-from solvers.algebra.sparse import Sparse, diagonal, nothing, sparse_from_entries
+from solvers.algebra.sparse import Sparse
 from solvers.api import Array
 from solvers.mesh.skin import Skin
 from solvers.structure.field import Structure
@@ -45,35 +45,7 @@ def wetted_surfaces(
     touching += [] if near_walls is None else [near_walls.ravel()]
     dofs = np.concatenate([np.empty(0, dtype=np.int64), *touching])
     surfaces = [_wetted_surface(structure, index, skin, ties, dofs) for index, skin in enumerate(skins)]
-    if ties:
-        return joined(surfaces, [skin.points for skin in skins])
-    if all(surface.mixture is None for surface in surfaces):
-        return surfaces
-    return [
-        surface if surface.mixture is not None else replace(surface, mixture=diagonal(np.ones(len(surface.points))))
-        for surface in surfaces
-    ]
-
-
-def bulge(skin: Skin) -> Sparse | None:
-    """Vertices from the nodes of a second-order surface, (n, n); None: all are nodes.
-
-    A vertex in the middle of corners lies farther from their mean m than its node x, at m + 4/3 (x - m). So segments
-    and triangles enclose what the parabolas of the facets enclose, up to fourth order. A uniform pressure on them has
-    the nodal forces of the element, 1/6, 2/3, 1/6 of its resultant on a straight edge; through the nodes these would be
-    1/4, 1/2, 1/4, and a plane surface would not stay plane.
-    """
-    if not skin.middles:
-        return None
-    count = len(skin.points)
-    identity, moved = diagonal(np.ones(count)), nothing((count, count))
-    for middles in skin.middles:
-        vertices, corners = middles[:, 0], middles[:, 1:].ravel()
-        around = np.repeat(vertices, len(corners) // len(vertices))
-        means = np.full(len(corners), len(vertices) / len(corners))
-        moved = moved + sparse_from_entries(vertices, vertices, np.ones(len(vertices)), (count, count))
-        moved = moved - sparse_from_entries(around, corners, means, (count, count))
-    return identity + moved * (1.0 / 3.0)
+    return joined(surfaces, [skin.points for skin in skins]) if ties else surfaces
 
 
 def _wetted_surface(
@@ -84,16 +56,11 @@ def _wetted_surface(
     layout = Layout(body.domain.comm, [other.size for other in bodies])
     dofs = global_dofs(layout, index, body, skin.nodes)
     in_contact = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
-    slides = structure.constraint is not None and np.isin(dofs[:, 0], structure.constraint.touching_dofs()).any()
-    bulged = None if slides else bulge(skin)
-    points = skin.points if bulged is None else bulged @ skin.points
     candidates = candidate_facets(body.name, skin, ties)
     if not candidates:
-        return WettedSurface(body.name, points, dofs, skin.facets, skin.wet, in_contact, mixture=bulged)
-    divided = divide_facets(points, skin.facets, candidates)
+        return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, in_contact)
+    divided = divide_facets(skin.points, skin.facets, candidates)
     mixture, of = divided.mixture, divided.parents
-    if bulged is not None:
-        mixture = bulged if mixture is None else mixture @ bulged
     return WettedSurface(
         body.name,
         skin.points if mixture is None else mixture @ skin.points,

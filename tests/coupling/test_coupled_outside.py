@@ -22,7 +22,7 @@ structure:
   dynamics: {rho_inf: 0.8}
   bodies:
     wall:
-      mesh: {shape: tube, inner_radius: 1, outer_radius: 1.09, height: 2, cells: [16, 1, 3], order: 1}
+      mesh: {shape: tube, inner_radius: 1, outer_radius: 1.09, height: 2, cells: [16, 1, 3]}
       material: {law: st_venant_kirchhoff, E: 20, nu: 0.3, density: 1}
       supports: [{on: [bottom, top], symmetry: true}]
 coupling: {wetted: {wall: inner}, dry_side: {wall: outside}}
@@ -63,7 +63,7 @@ fluid:
 structure:
   bodies:
     block:
-      mesh: {shape: box, size: [1, 0.5, 0.11], cells: [3, 2, 1], cell: tet, order: 1, translate: [0, 0, 0.39]}
+      mesh: {shape: box, size: [1, 0.5, 0.11], cells: [3, 2, 1], cell: tet, translate: [0, 0, 0.39]}
       material: {law: st_venant_kirchhoff, E: 1e5, nu: 0}
       supports: [{on: bottom, displacement: [0, 0, 0]}, {on: [left, right, front, back], symmetry: true}]
 coupling: {wetted: {block: top}, dry_side: {block: outside}}

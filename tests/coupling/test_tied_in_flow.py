@@ -159,11 +159,11 @@ structure:
   dynamics: {rho_inf: 0.5}
   bodies:
     low:
-      mesh: {shape: box, size: [0.04, 0.6, 0.31], cells: [1, 3, 2], order: 1, origin: [0.57, 0, 0]}
+      mesh: {shape: box, size: [0.04, 0.6, 0.31], cells: [1, 3, 2], origin: [0.57, 0, 0]}
       material: {law: neo_hooke, E: 1e6, nu: 0.3, density: 1}
       supports: [{on: bottom, displacement: [0, 0, 0]}]
     high:
-      mesh: {shape: box, size: [0.04, 0.6, 0.29], cells: [1, 4, 3], order: 1, origin: [0.57, 0, 0.31]}
+      mesh: {shape: box, size: [0.04, 0.6, 0.29], cells: [1, 4, 3], origin: [0.57, 0, 0.31]}
       material: {law: neo_hooke, E: 1e6, nu: 0.3, density: 1}
       supports: [{on: top, displacement: [0, 0, 0]}]
 contact:

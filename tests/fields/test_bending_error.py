@@ -35,7 +35,9 @@ TIP = 1e-10 * (4 * (1 - 0.3**2) / 0.1**3 + 1 / (5 / 6 / 2.6 * 0.1))
 
 def settings(changes):
     return [
-        change if change.startswith(("probes", "structure", "contact")) else f"structure.bodies.beam.{change}"
+        change
+        if change.startswith(("probes", "structure", "contact", "fluid", "coupling"))
+        else f"structure.bodies.beam.{change}"
         for change in changes
     ]
 
@@ -162,6 +164,17 @@ def test_order_in_contact(tmp_path):
     tie = "{slave: {body: beam, on: bottom}, master: {body: block, on: top}, tied: true}"
     tied = load(tmp_path, f"structure.bodies.block={other}", f"contact.pairs.tie={tie}", "probes={}")
     assert read_body(tied, "beam").cell_type == "quad9"
+
+
+FLOW = """{density: 1, viscosity: 1, scheme: bdf2, grid: {from: [0, -1], to: [3, 1], cells: [12, 8]},
+ patches: {walls: {on: [x-, y-, y+], no_slip: true}, out: {on: x+, outflow: true}}}"""
+
+
+def test_order_in_a_flow(tmp_path):
+    """First order, whose nodes get the right share of a pressure."""
+    more = "structure.dynamics={}", "structure.bodies.beam.material.density=1", "coupling={}"
+    case = load(tmp_path, f"fluid={FLOW}", *more, "kinematics=finite")
+    assert read_body(case, "beam").cell_type == "quad"
 
 
 def test_order_in_check_and_messages(tmp_path):
