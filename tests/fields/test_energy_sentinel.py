@@ -30,7 +30,7 @@ def test_energy_from_nothing():
     assert kinds(balance(flight)) == kinds(balance(flight), dissipates=True) == ["energy"]
     (found,) = EnergySentinel(balance(flight), dissipates=True).look(0.0, 0.1)
     assert found.value == pytest.approx(1.0)
-    assert "has grown without external work, by 1 J" in found.message
+    assert "has grown without external work, by 1 [energy]" in found.message
     assert kinds(balance([(0.0, 0.2, 0.8), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)])) == []
     assert kinds(balance([(0.0, 0.2, 0.8), (1.0, 2.0, 0.0), (0.0, 2.0, 0.0)])) == []  # work was done
 
