@@ -86,9 +86,9 @@ class PatchSection(Section):
     )
     rate: TimeFormula | None = setting(
         None,
-        "of a periodic patch, the mean along the period of the fluid's flow rate, towards x+, y+ or z+: a uniform force "
-        "per volume, which the run finds, drives it, in addition to 'gravity' and 'body_force'; in 2D m^2/s, the rate "
-        "per depth; default: free",
+        "of a periodic patch, the mean along the period of the fluid's flow rate, towards x+, y+ or z+: a uniform "
+        "force per volume, which the run finds, drives it, in addition to 'gravity' and 'body_force'; in 2D m^2/s, "
+        "the rate per depth; default: free",
         unit="m^3/s",
     )
 

@@ -1,4 +1,4 @@
-"""Periodic flows with a given rate: the force that drives it is that of exact flows, and the flow is that of the force."""
+"""Periodic flows with a given rate: the force that drives it is that of exact flows, the flow is that of the force."""
 
 import numpy as np
 import pytest
@@ -117,7 +117,7 @@ def test_the_rate_is_the_mean_over_the_period(element):
 
 
 def test_womersley():
-    """Q = Re(Q0 e^(i w t)): G = Re(i w rho Q0 e^(i w t) / (1 - tanh(k / 2) / (k / 2))), k^2 = i w rho H^2 / mu; second order."""
+    """G = Re(i w rho Q0 e^(i w t) / (1 - tanh(k / 2) / (k / 2))) with k^2 = i w rho H^2 / mu, to second order."""
     w, mu, Q0 = 2.0 * np.pi, 0.05, 0.4
     k = np.sqrt(1j * w / mu)
     factor = 1j * w / (1.0 - np.tanh(k / 2) / (k / 2))
@@ -139,7 +139,6 @@ def test_womersley():
             found.append(driving(fluid))
         times = dt * np.arange(1, 2 * steps + 1)
         errors.append(np.abs(np.array(found) - force(times))[steps:].max() / abs(factor * Q0))
-    print(errors)
     assert errors[0] < 2e-2
     assert errors[1] < 0.28 * errors[0]
 
@@ -152,11 +151,14 @@ def test_a_square_duct():
     for cells in (2, 4):
         walls = Patch("walls", ("y-", "y+", "z-", "z+"), "no_slip")
         fluid = make_fluid(
-            uniform([0, 0, 0], [1, 1, 1], [2, cells, cells]), [ends(0.3), walls], element="q2q1", mu=0.2, scheme="steady"
+            uniform([0, 0, 0], [1, 1, 1], [2, cells, cells]),
+            [ends(0.3), walls],
+            element="q2q1",
+            mu=0.2,
+            scheme="steady",
         )
         step(fluid, 0.0, 1.0)
         errors.append(abs(driving(fluid) / (exact * 0.2 * 0.3) - 1.0))
-    print(errors)
     assert errors[1] < 5e-3
     assert errors[1] < 0.3 * errors[0]
 
@@ -195,7 +197,6 @@ def test_iterative_solvers(dim, element, linear):
     force = (*twin_force(forces), *[still] * (dim - 2))
     other = channel([ends(None)], [disc(dim)], solver=solver, body_force=force, **given)
     steps = [step(other, 0.1 * n, 0.1) for n in range(2)]
-    print(newton, [s.iterations for s in steps], counts, [s.numbers["fluid.linear"] for s in steps])
     assert np.abs(flow - exact).max() < 1e-7 * np.abs(exact).max()
     per_system = sum(s.numbers["fluid.linear"] for s in steps) / sum(s.iterations for s in steps)
     assert counts.sum() / newton.sum() <= per_system + 3.0

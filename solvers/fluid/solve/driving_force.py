@@ -8,10 +8,11 @@ Tested with any w, w . a not zero, the first ones give G = w . r(u, 0) / (w . a)
 
     r(u, G) + a c (q - Q) = 0,
 
-in as many unknowns: w times this is c (w . a) (q - Q). The tangent gains a (c b - K^T w / (w . a))^T, of rank one, K that
-of r. Increments of Newton's method are those of the bordered system [[K, -a], [b^T, 0]] whatever w and c; both scale the
-residual alone. w is a unit velocity away from bodies, whose motion then does not change w . r. c is the force per rate
-that accelerates the fluid in a step, and that the slowest mode of a closed box of this size resists with.
+in as many unknowns: w times this is c (w . a) (q - Q). With K = dr/du at fixed G, the tangent is
+K + a (c b - K^T w / (w . a))^T. Increments of Newton's method are those of the bordered system [[K, -a], [b^T, 0]]
+whatever w and c, which scale the residual alone. w is a unit velocity away from bodies: their motion does not change
+w . r. c is the force per rate that accelerates the fluid in a step, and with which the slowest mode of a closed box of
+this size resists.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class DrivingForces:
 
     def prescribe(self, t: float) -> None:
         """Set the rates to those at the time t [s]."""
-        self._targets = np.array([evaluate(rate, np.zeros((3, 1)), t)[0] for rate in self._rates])
+        self._targets = self._given(t)
 
     def assemble(self, residuals: Sequence[Any], cut: Cut, weights: Weights, near: Mask) -> None:
         """Take a and b of a new cut, or of new scales of the stabilisation.
@@ -101,11 +102,16 @@ class DrivingForces:
         unknowns, grid = self._unknowns, self._unknowns.grid
         uncut, cells = (some[some < grid.owned] for some in (cut.uncut, cut.cut))
         fluid = np.concatenate(
-            [np.ones((len(uncut), len(weights.rule))), cut.fluid[: len(cut.cut)][cut.cut < grid.owned][:, weights.order]]
+            [
+                np.ones((len(uncut), len(weights.rule))),
+                cut.fluid[: len(cut.cut)][cut.cut < grid.owned][:, weights.order],
+            ]
         )
         cells = np.concatenate([uncut, cells])
         parts = grid.sizes[cells].prod(axis=1)[:, None] * ((fluid * weights.rule) @ weights.velocity_table[0])
-        out = np.bincount(unknowns.cell_velocity[cells][:, :, axis].ravel(), parts.ravel(), unknowns.local).astype(float)
+        out = np.bincount(unknowns.cell_velocity[cells][:, :, axis].ravel(), parts.ravel(), unknowns.local).astype(
+            float
+        )
         fem.add_ghosts(unknowns.space, out)
         edge = grid.grid.edges[axis]
         return out[: unknowns.owned] / (edge[-1] - edge[0])
@@ -116,6 +122,10 @@ class DrivingForces:
         """q [m^3/s] of values at owned dofs."""
         found: Array = self._comm.allreduce(self._means @ flow)
         return found
+
+    def speeds(self, velocity: Array, t: float) -> tuple[Array, Array]:
+        """Mean velocities [m/s] of the fluid along the periods: of the rates at the time t [s], and of a velocity."""
+        return self._given(t) / self._sections(), self.rates(velocity) / self._sections()
 
     def eliminated(self, rows: Array, flow: Array, held: Mask) -> tuple[Array, Array]:
         """(rows with the forces that balance them and with the rates, the change of these forces [N/m^3]).
@@ -164,9 +174,16 @@ class DrivingForces:
         terms, edges = self._terms, self._unknowns.grid.grid.edges
         slowest = sum((math.pi / (edge[-1] - edge[0])) ** 2 for edge in edges)
         mu = self._viscosity.where_it_shears(self._flow.x.array)
-        sections = self._comm.allreduce(self._means.sum(axis=1))
         inertia = float(terms.rho.value) * float(terms.alpha.value)
-        return (inertia + mu * slowest) / sections
+        return (inertia + mu * slowest) / self._sections()
+
+    def _sections(self) -> Array:
+        """Mean areas [m^2] of the fluid across the periods."""
+        found: Array = self._comm.allreduce(self._means.sum(axis=1))
+        return found
+
+    def _given(self, t: float) -> Array:
+        return np.array([evaluate(rate, np.zeros((3, 1)), t)[0] for rate in self._rates])
 
     def _tests(self, held: Mask) -> Array:
         """w: 1 at free velocities along the period, away from bodies if there are any."""

@@ -49,9 +49,10 @@ class KeptTangent:
 
     def added_product(self, held: NDArray[np.bool_]) -> Callable[[Array], Array] | None:
         """The part of low rank that the matrix lacks, as a product with owned values; None: zero."""
-        parts = [self._system.outlets.product(held), self._system.driving.product(held, self._slopes)]
-        given = [part for part in parts if part is not None]
-        return given[0] if len(given) == 1 else (lambda x: sum(part(x) for part in given)) if given else None
+        outlets, driving = self._system.outlets.product(held), self._system.driving.product(held, self._slopes)
+        if outlets is None or driving is None:
+            return outlets or driving
+        return lambda x: outlets(x) + driving(x)
 
     def rounding_error(self, linearise: Callable[[], PETSc.Mat]) -> Array:
         """`rounding` where this step linearised last; where it has not, at the present iterate."""

@@ -78,8 +78,9 @@ class FlowSystem:
         self.terms = coefficients(domain, settings, *parts, alpha=(self._alpha, self._scale_alpha), newton=self._newton)
         self.viscosity = CellViscosity(unknowns, settings)
         self.on_cut = self.viscosity.on_cut(self.terms)  #: coefficients in cut cells
-        functions = self.flow, self.history, self._force
-        self.driving = DrivingForces(unknowns, driven, functions, self.terms, self.viscosity)
+        self.driving = DrivingForces(
+            unknowns, driven, (self.flow, self.history, self._force), self.terms, self.viscosity
+        )
         #: gaps of a few cells, with first-order velocities
         with_gaps = with_bodies and settings.degree == 1
         self.gaps = GapTerms(grid, settings.viscosity, settings.density) if with_gaps else None
@@ -215,6 +216,11 @@ class FlowSystem:
         if unknowns.hanging is not None:
             held |= unknowns.hanging.dofs[: unknowns.owned]
         return held
+
+    def mean_speeds(self, velocity: Array, t: float) -> tuple[Array, Array]:
+        """`DrivingForces.speeds` on the present cut, of a velocity at local dofs (collective)."""
+        self._follow()
+        return self.driving.speeds(velocity[: self.unknowns.owned], t)
 
     def dofs_near_surfaces(self) -> NDArray[np.bool_]:
         """Mask of the owned dofs of cut cells and of the cells around them (collective)."""

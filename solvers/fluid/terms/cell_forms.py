@@ -36,9 +36,9 @@ class CellForms:
 def coefficients(
     domain: fem.Domain, settings: FlowSettings, a: Any, history: Any, force: Any, *, alpha: tuple[Any, Any], newton: Any
 ) -> forms.Coefficients:
-    """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3] (None: zero), and its constants.
+    """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3], and its constants.
 
-    alpha: of the time derivative and of the scales of the stabilisation [1/s].
+    force: None: zero; alpha: of the time derivative and of the scales of the stabilisation [1/s].
     """
     return forms.Coefficients(
         rho=fem.constant(domain, settings.density),

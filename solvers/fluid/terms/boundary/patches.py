@@ -27,8 +27,8 @@ class Patch:
     velocity: all components are given; no_slip: they are zero; slip, symmetry: no normal velocity, no shear stress;
     traction [Pa]: sigma n is given; pressure [Pa]: n . sigma n = -p, no tangential velocity; outflow:
     mu du/dn - (p - p_h) n = 0, p_h: hydrostatic pressure of mean zero, modified where fluid enters; periodic: the flow
-    is the same on the opposite face, which belongs to the patch too, by a force that drives `rate`; resistance, windkessel: outflow at the pressure of
-    `outlet`. `kind` may also be a record of the user.
+    is the same on the opposite face, which belongs to the patch too, and a force drives `rate`; resistance,
+    windkessel: outflow at the pressure of `outlet`. `kind` may also be a record of the user.
     """
 
     name: str
