@@ -103,7 +103,7 @@ class PatchSection(Section):
         if self.periodic:
             self._check_period()
         elif self.rate is not None:
-            raise fault(f"a '{given[0]}' patch has no 'rate', a periodic one may: prescribe a 'velocity'", "rate")
+            raise fault(f"is for a periodic patch, not for '{given[0]}'", "rate")
         return self
 
     def _check_period(self) -> None:
