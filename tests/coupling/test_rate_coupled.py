@@ -76,6 +76,7 @@ def test_the_motion_is_that_of_the_force(tmp_path, bodies, x, element, scheme, l
     terms = [f"where(abs(t - {STEP * (n + 1)!r}) < 0.1*{STEP}, {G!r}, 0)" for n, G in enumerate(found["driving"])]
     other = run(tmp_path / "force", bodies, rate="", force=f'body_force: ["{" + ".join(terms)}", 0]', **choices)
     assert sum(found["iterations"]) <= 1.1 * sum(other["iterations"])
+    assert np.abs(found["interface.momentum"]).max() < 1e-8 * np.abs(found["force.x"]).max()
     for column in ("rate", "energy", "force.x"):
         assert np.abs(np.array(found[column]) - other[column]).max() < 1e-8 * np.abs(other[column]).max(), column
 

@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
-from fluid_setup import body, circle, field, loop, make_fluid, nodal_errors, sphere, step
+from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, sphere, step
 
+from solvers.api import StepFailed
+from solvers.fluid.cut.ways import winds
 from solvers.fluid.flow.probes import flow_rate
 from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.shear_law import ShearLaw
 from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.boundary.windkessel import Windkessel
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 
@@ -104,6 +108,63 @@ def test_a_steady_flow_is_that_of_its_force():
     run_on = [step(other, 0.1 * n, 0.1).iterations for n in range(4)]
     assert len(run_on) == 4
     assert np.abs(other.flow - fluid.flow).max() < 1e-8 * np.abs(fluid.flow).max()
+
+
+def thin(element):
+    way = np.array([0.3, 0.05])
+    plate = block([0.83, 0.2], [0.84, 0.6])
+    return [body("plate", *plate, motion=lambda x, t: (x + t * way, 0 * x + way))], [WALLS], {"element": element}
+
+
+def open_above(kind):
+    outlet = Windkessel(3.0) if kind == "resistance" else None
+    sides = [Patch("floor", ("y-",), "no_slip"), Patch("top", ("y+",), kind, outlet=outlet)]
+    return [disc(v=(0.3, 0.2, 0.0))], sides, {"element": "q1q1"}
+
+
+@pytest.mark.parametrize(("bodies", "sides", "more"), [
+    thin("q1q1"), thin("q2q1"), open_above("outflow"), open_above("resistance"),
+    ([disc()], [WALLS], {"shear": ShearLaw(0.001, 2.0, 0.4)}),
+    ([disc(v=(0.1, -0.5, 0.0))], [WALLS], {"narrow_gaps": True}),
+], ids=["thin q1q1", "thin q2q1", "outflow", "resistance", "shear", "gaps"])  # fmt: skip
+def test_beside_other_features(bodies, sides, more):
+    """Thin bodies with unknowns of each side, outlets, a viscosity by the shear rate, narrow gaps: as their force."""
+    grid = uniform([0, 0], [2, 1], [16, 8])
+    fluid = make_fluid(grid, [ends(pulse), *sides], bodies, mu=0.05, dt=0.1, **more)
+    forces, counts, _, flow = run(fluid)
+    force = twin_force(forces)
+    other = make_fluid(grid, [ends(None), *sides], bodies, mu=0.05, dt=0.1, body_force=force, **more)
+    others = [step(other, 0.1 * n, 0.1).iterations for n in range(4)]
+    assert np.abs(other.flow - flow).max() < 1e-10 * np.abs(flow).max()
+    assert counts.sum() <= sum(others) + 2
+
+
+@pytest.mark.parametrize("scheme", ["steady", "bdf2"])
+def test_plug_flow_along_slip_walls(scheme):
+    """Nothing resists in steady flow; in time the jump of the rate is that of the momentum, and then no force acts."""
+    walls = Patch("walls", ("y-", "y+"), "slip")
+    fluid = make_fluid(uniform([0, 0], [2, 1], [4, 4]), [ends(0.2), walls], mu=0.1, dt=0.1, scheme=scheme)
+    forces = run(fluid, 2)[0]
+    assert forces == pytest.approx([0.0 if scheme == "steady" else 2.0, 0.0], abs=1e-12)
+    assert fluid.flow[fluid.unknowns.velocity.dofs[:, 0]] == pytest.approx(0.2, rel=1e-12)
+
+
+def test_a_period_that_is_too_narrow():
+    fluid = make_fluid(uniform([0, 0], [2, 1], [4, 1]), [ends(0.2), WALLS], mu=0.1, dt=0.1)
+    with pytest.raises(
+        StepFailed, match="no node of the flow is free along a period with a 'rate': nothing flows there"
+    ):
+        step(fluid, 0.0, 0.1)
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("linear", ["direct", "iterative", "ilu"])
+def test_a_period_that_a_body_blocks(element, linear):
+    wall = body("wall", *block([0.83, -0.1], [1.13, 1.1]))
+    solver = SolverSettings(Tolerance(residual=1e-8), linear=linear)
+    fluid = channel([ends(0.2)], [wall], element=element, solver=solver)
+    with pytest.raises(StepFailed, match="bodies close a period, and leave no way for its 'rate'"):
+        step(fluid, 0.0, 0.1)
 
 
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
@@ -261,3 +322,42 @@ def test_the_tangent_is_the_derivative(element):
     added = iterate.added_product()(direction)
     assert np.abs(y.array + added - difference).max() < 1e-6 * np.abs(difference).max()
     assert np.abs(added).max() > 1e-3 * np.abs(difference).max()
+
+
+def test_ways_from_period_to_period():
+    """A loop counts if it ends in another period than it began: (part at an end, part at the next beginning)."""
+    assert not winds([])
+    assert not winds([(1, 2)])  # a wall in the middle
+    assert winds([(1, 1)])
+    assert winds([(1, 2), (2, 1)])  # two strips that lead into one another
+    assert not winds([(1, 2), (3, 2), (3, 4)])  # a bay
+    assert winds([(5, 6), (1, 2), (3, 2), (3, 4), (1, 3)])
+
+
+@pytest.mark.parametrize("share", ["through", "closed"])
+def test_a_labyrinth(share):
+    """Two walls, each with a hole, at which a third one ends or not."""
+    gap = 0.3 if share == "through" else -0.1
+    walls = [
+        body("one", *block([0.3, -0.1], [0.6, 0.7])),
+        body("two", *block([1.1, gap], [1.4, 1.1])),
+    ]
+    fluid = channel([ends(0.02)], walls, n=2, element="q1q1")
+    if share == "through":
+        assert np.isfinite(run(fluid, 1)[0]).all()
+    else:
+        with pytest.raises(StepFailed, match="bodies close a period"):
+            step(fluid, 0.0, 0.1)
+
+
+@pytest.mark.parametrize("thickness", [0.1, 0.01])
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("linear", ["direct", "iterative"])
+def test_a_period_that_a_thin_body_blocks(element, linear, thickness):
+    """Cells beside both of its sides share corners, so that it is the equations that have no solution."""
+    wall = body("wall", *block([0.83, -0.1], [0.83 + thickness, 1.1]))
+    fluid = channel(
+        [ends(0.2)], [wall], element=element, solver=SolverSettings(Tolerance(residual=1e-8), linear=linear)
+    )
+    with pytest.raises(StepFailed):
+        print("THIN", run(fluid, 2)[:2], fluid.system.driving.rates(fluid.iterate.values()))

@@ -27,6 +27,7 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import EPS, Array, FailureKind, Mask, StepFailed
 from solvers.fluid.cut.cut import Cut
+from solvers.fluid.cut.ways import leads_through
 from solvers.fluid.cut.weights import Weights
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.solve.cell_viscosity import CellViscosity
@@ -73,8 +74,13 @@ class DrivingForces:
     def assemble(self, residuals: Sequence[Any], cut: Cut, weights: Weights, near: Mask) -> None:
         """Take a and b of a new cut, or of new scales of the stabilisation.
 
-        residuals: forms over the cells, in which the force is linear; near: dofs that bodies reach.
+        residuals: forms over the cells, in which the force is linear; near: dofs that bodies reach. Raises StepFailed
+        if bodies close a period.
         """
+        grid = self._unknowns.grid
+        if not all(leads_through(grid, cut, axis, self._unknowns.periodic) for axis in self._axes):
+            reason = "bodies close a period, and leave no way for its 'rate'"
+            raise StepFailed("fluid", FailureKind.NEWTON, reason)
         self._away = ~near
         functions = self._flow, self._history, self._force
         before = [function.x.array.copy() for function in functions]
@@ -137,6 +143,13 @@ class DrivingForces:
         change = self._by_rows(held)(rows)
         missing = self._stiffness() * (self._targets - self.rates(flow))
         return rows - (change + missing) @ np.where(held, 0.0, self._columns), change
+
+    def met(self, flow: Array) -> bool:
+        """Whether the rates are those given, in half of the digits of their terms."""
+        if not self.given:
+            return True
+        sizes = self._comm.allreduce(np.abs(self._means) @ np.abs(flow))
+        return bool((np.abs(self._targets - self.rates(flow)) <= math.sqrt(EPS) * sizes).all())
 
     def take(self, change: Array) -> None:
         """Change the forces on the fluid."""
