@@ -175,13 +175,6 @@ class DrivingForces:
         inverse = np.linalg.inv(self._moments(held))
         return lambda x: (stiffness * self.rates(x) - inverse @ self._comm.allreduce(slopes @ x)) @ columns
 
-    def rounding(self, flow: Array) -> Array:
-        """Rounding errors of a c (q - Q): those of each term of q, with random signs."""
-        if not self.given:
-            return np.zeros(len(flow))
-        squares = self._comm.allreduce(self._means**2 @ flow**2)
-        return EPS * (self._stiffness() * np.sqrt(squares)) @ np.abs(self._columns)
-
     def _stiffness(self) -> Array:
         """c [N/m^3 per m^3/s]."""
         terms, edges = self._terms, self._unknowns.grid.grid.edges

@@ -43,7 +43,7 @@ class KeptTangent:
         self.diagonal = np.abs(matrix.getDiagonal().array)
         # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self._system.grid.dim * rounding_error(matrix, values)
-        self.rounding += self._system.outlets.rounding(values) + self._system.driving.rounding(values)
+        self.rounding += self._system.outlets.rounding(values)
         self._slopes = self._system.driving.slopes(matrix, held)
         return matrix
 
