@@ -62,9 +62,10 @@ class FlowStart:
             if body.motion is not None:
                 later.append(body.motion(end).v)
         if fluid.system.driving.given:
-            given, present = fluid.system.mean_speeds(fluid.history.past[0].velocity, t)
-            pairs.append((given, present))
-            later.append(fluid.system.mean_speeds(fluid.history.past[0].velocity, end)[0])
+            fluid.system.assemble_interface()  # and what belongs to the cut
+            velocity = fluid.history.past[0].velocity[: fluid.size]
+            pairs.append(fluid.system.driving.speeds(velocity, t))
+            later.append(fluid.system.driving.speeds(velocity, end)[0])
         jump = max(np.abs(a - b).max(initial=0.0) for a, b in pairs)
         speed = max(np.abs(some).max(initial=0.0) for some in chain(later, *pairs))
         jump, speed = (fluid.comm.allreduce(float(size), op=MPI.MAX) for size in (jump, speed))

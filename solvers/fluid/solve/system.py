@@ -217,11 +217,6 @@ class FlowSystem:
             held |= unknowns.hanging.dofs[: unknowns.owned]
         return held
 
-    def mean_speeds(self, velocity: Array, t: float) -> tuple[Array, Array]:
-        """`DrivingForces.speeds` on the present cut, of a velocity at local dofs (collective)."""
-        self._follow()
-        return self.driving.speeds(velocity[: self.unknowns.owned], t)
-
     def dofs_near_surfaces(self) -> NDArray[np.bool_]:
         """Mask of the owned dofs of cut cells and of the cells around them (collective)."""
         assert self.cut is not None
