@@ -103,7 +103,7 @@ def _body_force(settings: FluidSection) -> tuple[Value, ...] | None:
 
 def _patches(settings: FluidSection) -> list[Patch]:
     return [
-        Patch(name, patch.on, patch.kind, patch.value, patch.where, patch.outlet)
+        Patch(name, patch.on, patch.kind, patch.value, patch.where, patch.outlet, patch.rate)
         for name, patch in settings.patches.items()
     ]
 
@@ -185,6 +185,10 @@ def _of_outlet(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return probes.of_outlet(forces.fluid, case.probes[name].through or "")
 
 
+def _driving_force(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    return probes.driving_force(forces.fluid, case.probes[name].through or "")
+
+
 def _extreme(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return extreme_pressure(forces.fluid, case.probes[name].extreme or "largest")
 
@@ -219,6 +223,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     **{(quantity, "plane"): _through_plane for quantity in ("flow_rate", "area", "pressure")},
     **{(quantity, "box"): _in_box for quantity in ("velocity", "pressure", "volume", "kinetic_energy")},
     ("outlet_pressure", "through"): _of_outlet,
+    ("driving_force", "through"): _driving_force,
     ("pressure", ""): _extreme,
     **{("speed", place): _place_of_extreme for place in ("box", "")},
     ("force", ""): _force,

@@ -84,6 +84,13 @@ class PatchSection(Section):
         False,
         "true: the flow is periodic between two opposite faces; 'on' names both, and the patch covers all of them",
     )
+    rate: TimeFormula | None = setting(
+        None,
+        "of a periodic patch, the mean along the period of the fluid's flow rate, towards x+, y+ or z+: a uniform "
+        "force per volume, which the run finds, drives it, in addition to 'gravity' and 'body_force'; in 2D m^2/s, "
+        "the rate per depth; default: free",
+        unit="m^3/s",
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> PatchSection:
@@ -95,6 +102,8 @@ class PatchSection(Section):
             raise fault(f"give only one of {words}", given[1])
         if self.periodic:
             self._check_period()
+        elif self.rate is not None:
+            raise fault(f"is for a periodic patch, not for '{given[0]}'", "rate")
         return self
 
     def _check_period(self) -> None:
@@ -104,6 +113,8 @@ class PatchSection(Section):
             other = face[0] + ("+" if face[1] == "-" else "-")
             if other not in self.on:
                 raise fault(f"'{face}' is periodic with '{other}': put both into 'on'", "on", index)
+        if self.rate is not None and len({face[0] for face in self.on}) > 1:
+            raise fault("a rate is along one period: give each direction a patch of its own", "rate")
 
     @property
     def kind(self) -> str:

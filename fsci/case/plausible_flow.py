@@ -136,7 +136,7 @@ def _driven(fluid: FluidSection) -> bool:
     loads = (fluid.gravity, fluid.body_force, fluid.initial_velocity)
     moved = any(body.motion or body.free for body in fluid.bodies.values())
     charged = (p.windkessel and p.windkessel.initial_pressure for p in fluid.patches.values())
-    driven = any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
+    driven = any(p.velocity or p.traction or p.pressure or p.rate for p in fluid.patches.values())
     return any(loads) or moved or driven or any(charged)
 
 

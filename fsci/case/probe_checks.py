@@ -111,6 +111,9 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
     if probe.quantity == "outlet_pressure" and (through := fluid.patches.get(probe.through or "")):
         if through.outlet is None:
             yield (*keys, "through"), f"the patch '{probe.through}' is neither a 'resistance' nor a 'windkessel'"
+    if probe.quantity == "driving_force" and (through := fluid.patches.get(probe.through or "")):
+        if through.rate is None:
+            yield (*keys, "through"), f"the patch '{probe.through}' is not periodic with a 'rate'"
     if probe.reference is not None:
         yield from _reference(probe.reference, grid.dimension, (*keys, "reference"))
     if probe.plane is not None:

@@ -32,6 +32,7 @@ CHANGEABLE = (
     ),
     *(f"fluid.{name}" for name in ("density", "viscosity", "gravity", "body_force", "dynamics")),
     *(f"fluid.patches.*.{kind}" for kind in KINDS_OF_PATCH if kind != "periodic"),
+    "fluid.patches.*.rate",
     *(f"fluid.bodies.*.{name}" for name in ("motion", "slip_length")),
     *(
         f"{body}.{name}"

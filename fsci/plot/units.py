@@ -31,7 +31,7 @@ POWERS: dict[str, Powers] = {
 }
 #: Quantities that do not grow with the depth; all others are per depth in 2D.
 INTENSIVE = ("displacement", "velocity", "speed", "acceleration", "gap", "mean_gap", "overlap", "pressure",
-             "mean_pressure", "outlet_pressure", "first_contact", "centre", "drag_coefficient",
+             "mean_pressure", "outlet_pressure", "driving_force", "first_contact", "centre", "drag_coefficient",
              "lift_coefficient")  # fmt: skip
 
 SIZES = {**LENGTHS, **MASSES, **UNITS_OF_TIME}  #: in m, kg and s

@@ -16,6 +16,7 @@ from solvers.fluid.grid.box import Grid, uniform
 from solvers.fluid.surfaces.inside import PointInBody
 from solvers.fluid.terms import forms
 from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.boundary.windkessel import Windkessel
 
 GRADED = Grid((np.array([0, 0.5, 0.8, 1.5, 2.2, 3.0]), np.array([0, 0.2, 0.6, 0.8, 1.0])))
 ENDS = Patch("ends", ("x-", "x+"), "periodic")
@@ -279,3 +280,16 @@ def test_a_disc_moves_through_the_end(element):
             found.append(fluid.force()["disc"].sum(axis=0))
         histories.append(np.array(found))
     assert np.abs(histories[1] - histories[0]).max() < 1e-10 * np.abs(histories[0]).max()
+
+
+@pytest.mark.parametrize("kind", ["outflow", "resistance"])
+def test_a_force_along_the_period_beside_an_outflow(kind):
+    """u = f / mu (y - y^2 / 2) below a face without shear stress: a periodic pressure balances no such force."""
+    outlet = Windkessel(3.0) if kind == "resistance" else None
+    patches = [ENDS, Patch("floor", ("y-",), "no_slip"), Patch("top", ("y+",), kind, outlet=outlet)]
+    fluid = make_fluid(GRADED, patches, element="q2q1", mu=0.1, scheme="steady", body_force=field(1, -7))
+    solve_steady(fluid)
+    exact = (lambda x, t: 10.0 * (x[1] - 0.5 * x[1] ** 2), still)
+    u, p = nodal_errors(fluid, exact, lambda x, t: 7.0 * (1.0 - x[1]), 0.0)
+    assert u < 1e-12
+    assert p < 1e-11

@@ -102,6 +102,20 @@ MISTAKES = [
         "8:17: the patch 'ends' makes the face 'x-' periodic, which allows no other patch on it",
         "x-",
     ),
+    ("outflow: true", "outflow: true, rate: 1", "9:43: 'rate' is for a periodic patch, not for 'outflow'", "1}"),
+    ("no_slip: true", "periodic: true, rate: y", "10:49: 'rate' must not depend on y", "y}"),
+    (
+        "on: [y-, y+], no_slip: true",
+        "on: [x-, x+, y-, y+], periodic: true, rate: 1",
+        "10:57: a rate is along one period: give each direction a patch of its own",
+        "1}",
+    ),
+    (
+        "quantity: flow_rate",
+        "quantity: driving_force",
+        "19:43: the patch 'outlet' is not periodic with a 'rate'",
+        "outlet",
+    ),
     # bodies
     (
         "    cylinder:",

@@ -433,8 +433,8 @@ class Fluid:
 
     def only_rounding(self) -> NDArray[np.bool_]:
         """Whether the norm of the residual is that of rounding errors, where this step linearised last, shape (1,)."""
-        rounding = self.iterate.rounding(picard=self._picard)
-        return np.array([self._norm(self.iterate.rows) <= self._norm(rounding)])
+        rounding = self._norm(self.iterate.rounding(picard=self._picard))
+        return np.array([self.system.driving.met(self.iterate.values()) and self._norm(self.iterate.rows) <= rounding])
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the node with the largest momentum residual (collective)."""

@@ -56,19 +56,25 @@ class FlowIterate:
 
     def residual(self) -> Array:
         """Assemble the rows; zero at held dofs."""
-        with self._timer("assembly"):
-            self.rows = self._system.residual()
-        self._levels.spread_excess(self.rows)
-        self.rows[self.held] = 0.0
+        self.rows, change = self._assembled()
+        self._system.driving.take(change)
         return self.rows
+
+    def _assembled(self) -> tuple[Array, Array]:
+        """(the rows, the change of the driving forces that balances them)."""
+        with self._timer("assembly"):
+            rows = self._system.residual()
+        self._levels.spread_excess(rows)
+        rows[self.held] = 0.0
+        return self._system.driving.eliminated(rows, self.values(), self.held)
 
     def residual_of(self, flow: Array) -> Array:
         """The rows of another flow, at local dofs, with the viscosity that cut cells have now."""
-        present, rows = self._system.flow.x.array.copy(), self.rows
+        present = self._system.flow.x.array.copy()
         self._system.flow.x.array[:] = flow
         with self._system.viscosity.kept():
-            found = self.residual()
-        self._system.flow.x.array[:], self.rows = present, rows
+            found, _ = self._assembled()
+        self._system.flow.x.array[:] = present
         return found
 
     def local_values(self) -> Array:
@@ -134,7 +140,7 @@ class FlowIterate:
 
     def added_product(self) -> Callable[[Array], Array] | None:
         """The part of low rank of the tangent, as a product with owned values; None: zero."""
-        return self._system.outlets.product(self.held)
+        return self._tangent.added_product(self.held)
 
     def multigrid(self, matrix: PETSc.Mat, product: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent, which it multiplies by `product`; the next call overwrites it."""

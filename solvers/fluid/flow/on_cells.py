@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -26,7 +27,7 @@ from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.solve.linear_systems.krylov import FlowSolver, SolverSequence
 from solvers.fluid.surfaces.surface import Motion
-from solvers.fluid.terms.boundary.patches import Patch, outlet_laws
+from solvers.fluid.terms.boundary.patches import Patch, driven_periods, outlet_laws
 from solvers.fluid.terms.boundary.windkessel import Outlets
 from solvers.mesh.distributed import scatter
 from solvers.solver_settings import SolverSettings
@@ -57,6 +58,8 @@ class FlowOnCells:
         self._sequence = SolverSequence(comm, self.parts.methods, self.parts.unknowns.counted(), note)
         self.iterate = self._first_iterate()
         self._outlets = Outlets(outlet_laws(patches))
+        #: by the names of periods with a rate, the forces per volume that drive it [N/m^3]; nan before the first step
+        self.driving_forces = {name: math.nan for name, *_ in driven_periods(patches)}
         self.history = History(settings.time, self.parts.unknowns.local)
         self.prescribed_at = 0.0  #: time [s] of the velocities of the boundary
         self.renewals = 1  #: count of discretisations: one, and one for each change of cells
@@ -118,9 +121,10 @@ class FlowOnCells:
         system.begin_step(step, self.history.rate(rule), self.history.missing(rule), last)
 
     def prescribe(self, t: float) -> None:
-        """Set the velocities of the boundary to those at time t [s], until the next step begins."""
+        """Set velocities of the boundary and rates to those at time t [s], until the next step begins."""
         self.prescribed_at = t
         self.flow[self.parts.boundary.dofs] = self.parts.boundary.velocity(t)
+        self.parts.system.driving.prescribe(t)
 
     def predict(self, dt: float, *, with_pressure: bool) -> None:
         """Predictor for a step of length dt [s], see `Fluid.predict`."""
@@ -135,6 +139,7 @@ class FlowOnCells:
         system = self.parts.system
         assert system.cut is not None
         self._outlets.end_step(system.outlets.rates(self.iterate.values()).tolist())
+        self.driving_forces = dict(zip(self.driving_forces, system.driving.values.tolist(), strict=True))
         system.end_step()
         found = system.active_dofs | system.dofs_of(system.cut.contact_cells)
         velocity = self.velocity()
@@ -205,6 +210,7 @@ class FlowOnCells:
         closed = np.unique(np.concatenate(self._comm.allgather(np.flatnonzero(self.parts.cutter.closed))))
         state = self.history.save(self.parts.unknowns) | self.parts.system.save()
         state |= {"nested": nested, "closed": closed, "outlets": self._outlets.save()}
+        state |= {"driving_forces": self.driving_forces}
         return state | {"linear_solver": self._sequence.position}
 
     def restore_cells(self, state: State, sheets: Sheets | None, *, follow: bool) -> None:
@@ -222,5 +228,6 @@ class FlowOnCells:
         self.history.restore(self.parts.unknowns, own)
         self.parts.system.restore(own)
         self._outlets.restore(own["outlets"])
+        self.driving_forces = {name: own["driving_forces"].get(name, math.nan) for name in self.driving_forces}
         self._sequence.position = own["linear_solver"]
         self.parts.cutter.restore(own["closed"])

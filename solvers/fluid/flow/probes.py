@@ -185,6 +185,11 @@ def of_outlet(fluid: Fluid, patch: str) -> Probe:
     return lambda: {"": float(fluid.system.outlets.pressures(fluid.iterate.values())[number])}
 
 
+def driving_force(fluid: Fluid, patch: str) -> Probe:
+    """Probe of the force per volume [N/m^3] that drives the rate of a period; nan before the first step."""
+    return lambda: {"": fluid.on_cells.driving_forces[patch]}
+
+
 class FlowRate(Protocol):
     def __call__(self, patches: Sequence[str], among: NDArray[np.bool_] | None = None) -> float: ...
 

@@ -43,7 +43,7 @@ class FlowStart:
         return self.fluid.scheme.times > 1
 
     def jump(self, surfaces: Mapping[str, Motion], gained: float) -> float:
-        """Largest difference [m/s] of the velocities of boundary and bodies from the flow's at an impulsive start.
+        """Largest difference [m/s] of velocities of boundary, bodies and rates from the flow's at an impulsive start.
 
         0.0: they agree as far as they are known. surfaces: motions of coupled bodies by name; others are as prescribed.
         Those outside of the box do not count. gained: velocity [m/s] that coupled bodies gain in the first step.
@@ -61,6 +61,11 @@ class FlowStart:
             pairs.append((motion.v, flow))
             if body.motion is not None:
                 later.append(body.motion(end).v)
+        if fluid.system.driving.given:
+            fluid.system.assemble_interface()  # and what belongs to the cut
+            velocity = fluid.history.past[0].velocity[: fluid.size]
+            pairs.append(fluid.system.driving.speeds(velocity, t))
+            later.append(fluid.system.driving.speeds(velocity, end)[0])
         jump = max(np.abs(a - b).max(initial=0.0) for a, b in pairs)
         speed = max(np.abs(some).max(initial=0.0) for some in chain(later, *pairs))
         jump, speed = (fluid.comm.allreduce(float(size), op=MPI.MAX) for size in (jump, speed))

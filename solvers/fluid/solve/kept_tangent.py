@@ -23,6 +23,7 @@ class KeptTangent:
         self._system = system
         self.rounding: Array | None = None  #: of the residual at owned dofs; None before this step linearises
         self.diagonal = np.zeros(system.unknowns.owned)  #: its magnitude at owned dofs
+        self._slopes = np.zeros(0)  # of the driving forces
         self._held = np.zeros(system.unknowns.owned, dtype=bool)
         self._prepared: PETSc.Mat | None = None  # at the present iterate, if it is assembled already
         self._matrix: PETSc.Mat | None = None  # of the last increment
@@ -43,7 +44,15 @@ class KeptTangent:
         # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self._system.grid.dim * rounding_error(matrix, values)
         self.rounding += self._system.outlets.rounding(values)
+        self._slopes = self._system.driving.slopes(matrix, held)
         return matrix
+
+    def added_product(self, held: NDArray[np.bool_]) -> Callable[[Array], Array] | None:
+        """The part of low rank that the matrix lacks, as a product with owned values; None: zero."""
+        outlets, driving = self._system.outlets.product(held), self._system.driving.product(held, self._slopes)
+        if outlets is None or driving is None:
+            return outlets or driving
+        return lambda x: outlets(x) + driving(x)
 
     def rounding_error(self, linearise: Callable[[], PETSc.Mat]) -> Array:
         """`rounding` where this step linearised last; where it has not, at the present iterate."""

@@ -27,13 +27,14 @@ from solvers.fluid.mesh.space import Unknowns, set_velocity
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.solve.cell_viscosity import CellViscosity
+from solvers.fluid.solve.driving_force import DrivingForces
 from solvers.fluid.solve.hanging_system import HangingSystem
 from solvers.fluid.solve.outlet_terms import OutletTerms
 from solvers.fluid.solve.tangent_matrix import TangentMatrix
 from solvers.fluid.surfaces.surface import ImmersedSurface, by_facets, may_close, seeping
 from solvers.fluid.terms import nitsche
 from solvers.fluid.terms.boundary.outer_faces import OuterFaces, OuterOnCut
-from solvers.fluid.terms.boundary.patches import Boundary, outlet_laws
+from solvers.fluid.terms.boundary.patches import Boundary, driven_periods, outlet_laws
 from solvers.fluid.terms.boundary.windkessel import Outlets
 from solvers.fluid.terms.cell_forms import cell_forms, coefficients
 from solvers.fluid.terms.closed_contact.zone import ClosedZone, find_zone
@@ -71,10 +72,15 @@ class FlowSystem:
         self.flow, self.history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha, self._scale_alpha, self._newton = (fem.constant(domain, value) for value in (0.0, 0.0, 1.0))
         self.weights = Weights(grid, settings.degree)
-        parts = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
+        scales, history, force = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
+        driven = driven_periods(boundary.patches)
+        parts = scales, history, None if settings.body_force is None and not driven else force
         self.terms = coefficients(domain, settings, *parts, alpha=(self._alpha, self._scale_alpha), newton=self._newton)
         self.viscosity = CellViscosity(unknowns, settings)
         self.on_cut = self.viscosity.on_cut(self.terms)  #: coefficients in cut cells
+        self.driving = DrivingForces(
+            unknowns, driven, (self.flow, self.history, self._force), self.terms, self.viscosity
+        )
         #: gaps of a few cells, with first-order velocities
         with_gaps = with_bodies and settings.degree == 1
         self.gaps = GapTerms(grid, settings.viscosity, settings.density) if with_gaps else None
@@ -142,6 +148,7 @@ class FlowSystem:
         self.history.x.array[:] = rate
         if self.cut_penalty is not None:
             self.cut_penalty.begin_step(missing)
+        self.driving.begin_step()
         if self.settings.body_force is not None:
             set_velocity(self._force.x.array, self.unknowns.velocity, self.settings.body_force, step.t)
         self._outer.begin_step(step.t)
@@ -296,6 +303,8 @@ class FlowSystem:
                 if zone is not None and self.seeping is not None:
                     self._seepage = ZoneSeepage(zone, self.seeping / self.settings.viscosity)
         self.matrix.assemble_penalty(self._penalty_history)
+        if self.driving.given:
+            self.driving.assemble(self._residuals, cut, self.weights, self.dofs_near_surfaces())
         self._current = True
 
     def end_step(self) -> None:
@@ -361,7 +370,7 @@ class FlowSystem:
         return rows + self.outlets.rows(flow) + (0.0 if penalty is None else penalty.times(flow))
 
     def tangent(self, identity: NDArray[np.bool_], *, picard: bool) -> PETSc.Mat:
-        """d(residual)/d(flow) without `outlets.product`; the next call overwrites it.
+        """d(residual)/d(flow) without the parts of outlets and driving forces; the next call overwrites it.
 
         identity: owned dofs with such rows; picard: u . grad u is linearised without its second term, about the
         velocity of `set_scales`.

@@ -38,7 +38,7 @@ def coefficients(
 ) -> forms.Coefficients:
     """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3], and its constants.
 
-    alpha: of the time derivative and of the scales of the stabilisation [1/s].
+    force: None: zero; alpha: of the time derivative and of the scales of the stabilisation [1/s].
     """
     return forms.Coefficients(
         rho=fem.constant(domain, settings.density),
@@ -48,7 +48,7 @@ def coefficients(
         a=a,
         newton=newton,
         history=history,
-        force=forms.nothing(domain.dim) if settings.body_force is None else force,
+        force=forms.nothing(domain.dim) if force is None else force,
         convection=settings.convection,
         steady=settings.steady,
         degree=settings.degree,

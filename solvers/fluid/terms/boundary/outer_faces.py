@@ -18,7 +18,7 @@ from solvers.fluid.mesh.space import Unknowns, set_velocity
 from solvers.fluid.terms import forms
 from solvers.fluid.terms.boundary.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS, PatchKind
-from solvers.fluid.terms.boundary.patches import Boundary, Patch
+from solvers.fluid.terms.boundary.patches import Boundary, Patch, periodic_axes
 from solvers.values import Value, evaluate
 
 PRESSURE_PATCH = PATCH_KINDS["pressure"]
@@ -81,8 +81,10 @@ class OuterFaces:
         for kind in dict.fromkeys(patch.record for _, patch in with_form if not patch.record.value):
             self.terms.append(term(kind, tuple(n for n, patch in with_form if patch.record == kind)))
         if body_force is not None:
+            periods = periodic_axes(boundary.patches)  # a periodic pressure balances no force along them
+            at_rest = [0.0 if axis in periods else component for axis, component in enumerate(body_force)]
             for number, face, middle in self._outflows():
-                self.terms.append(term(PRESSURE_PATCH, (number,), [_hydrostatic(body_force, middle)], face))
+                self.terms.append(term(PRESSURE_PATCH, (number,), [_hydrostatic(at_rest, middle)], face))
 
         self._unit_pressures = [
             term(PRESSURE_PATCH, (number,), [1.0]) for number, patch in enumerate(boundary.patches) if patch.outlet

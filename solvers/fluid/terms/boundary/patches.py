@@ -27,8 +27,8 @@ class Patch:
     velocity: all components are given; no_slip: they are zero; slip, symmetry: no normal velocity, no shear stress;
     traction [Pa]: sigma n is given; pressure [Pa]: n . sigma n = -p, no tangential velocity; outflow:
     mu du/dn - (p - p_h) n = 0, p_h: hydrostatic pressure of mean zero, modified where fluid enters; periodic: the flow
-    is the same on the opposite face, which belongs to the patch too; resistance, windkessel: outflow at the pressure of
-    `outlet`. `kind` may also be a record of the user.
+    is the same on the opposite face, which belongs to the patch too, and a force drives `rate`; resistance,
+    windkessel: outflow at the pressure of `outlet`. `kind` may also be a record of the user.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Patch:
     value: Sequence[Value] | None = None  #: velocity, traction or pressure
     where: Value | None = None  #: positive on the part of the faces that belongs to the patch; None: all
     outlet: Windkessel | None = None  #: its pressure by the flow rate; None: zero
+    rate: Value | None = None  #: of a period, the mean along it of the fluid's flow rate [m^3/s]; None: free
 
     def __post_init__(self) -> None:
         assert set(self.faces) <= set(FACES)
@@ -60,6 +61,11 @@ def periodic_axes(patches: Sequence[Patch]) -> tuple[int, ...]:
     faces = {face for patch in patches if patch.record.periodic for face in patch.faces}
     assert all(face[0] + other in faces for face in faces for other in "-+"), "both ends of a period"
     return tuple(sorted({"xyz".index(face[0]) for face in faces}))
+
+
+def driven_periods(patches: Sequence[Patch]) -> list[tuple[str, int, Value]]:
+    """Names, directions and rates of the periods with a given rate."""
+    return [(patch.name, "xyz".index(patch.faces[0][0]), patch.rate) for patch in patches if patch.rate is not None]
 
 
 def outlet_laws(patches: Sequence[Patch]) -> dict[str, Windkessel]:
