@@ -74,10 +74,10 @@ def read_body(case: Case, name: str) -> Mesh:
     keys: Keys = ("structure", "bodies", name, "mesh")
     try:
         mesh = _elastic_mesh(case, name, settings.mesh)
-        if chooses_order(settings.mesh) and not _meets_others(case, name) and is_slender(mesh):
+        _require_dimension(case, name, mesh)
+        if chooses_order(settings.mesh) and not _meets_others(case, name, mesh) and is_slender(mesh):
             mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
-        _require_dimension(case, name, mesh)
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
             keys = ("structure", "bodies", name, "element")
             raise MeshError(NO_MIXED_SIMPLICES)
@@ -103,15 +103,17 @@ def chooses_order(mesh: MeshSection) -> bool:
     return mesh.order == "auto" and is_meshed_here(mesh)
 
 
-def _meets_others(case: Case, name: str) -> bool:
-    """Whether a body is in a flow, or in contact that is no tie.
+def _meets_others(case: Case, name: str, mesh: Mesh) -> bool:
+    """Whether a body is in the box of a flow at the start, or in contact that is no tie.
 
     First order is more robust in contact, where second-order surfaces are clipped as linear parts, and the kinks
     between them make the active set change. A flow sees linear parts, too: a uniform pressure has not the nodal forces
     of the element, 1/4, 1/2, 1/4 for 1/6, 2/3, 1/6.
     """
-    if case.coupling is not None:
-        return True
+    if case.coupling is not None and case.fluid is not None:
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        if (low <= case.fluid.grid.to).all() and (high >= case.fluid.grid.start).all():
+            return True
     if case.contact is None:
         return False
     named = case.elastic_bodies if case.contact.bodies == "all" else case.contact.bodies or ()

@@ -175,6 +175,9 @@ def test_order_in_a_flow(tmp_path):
     more = "structure.dynamics={}", "structure.bodies.beam.material.density=1", "coupling={}"
     case = load(tmp_path, f"fluid={FLOW}", *more, "kinematics=finite")
     assert read_body(case, "beam").cell_type == "quad"
+    beside = "mesh={shape: rectangle, size: [1, 0.1], cells: [20, 2], origin: [9, 0]}"
+    case = load(tmp_path, f"fluid={FLOW}", *more, "kinematics=finite", beside, "probes={}")
+    assert read_body(case, "beam").cell_type == "quad9"
 
 
 def test_order_in_check_and_messages(tmp_path):
