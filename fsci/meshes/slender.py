@@ -66,7 +66,8 @@ def _walls(mesh: Mesh) -> _Walls:
         vectors = around[:, 0, ::-1] * [1.0, -1.0]
     else:
         vectors = 0.5 * np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
-    areas, edges = np.linalg.norm(vectors, axis=1), np.sqrt((around**2).sum(axis=2).mean(axis=1))
+    areas = np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(float).tiny)  # wrong meshes are refused later
+    edges = np.sqrt((around**2).sum(axis=2).mean(axis=1))
     volumes = np.abs(signed_volumes(mesh))
     heights = volumes[rows // len(kind.facets)] / areas * (mesh.points.shape[1] if kind.shape.simplex else 1)
 
