@@ -19,12 +19,11 @@ from solvers.fluid.geometry.thin.sheets import Sheets
 
 
 def recurring(earlier: Sequence[Sheets], now: Sheets) -> list[Sheets]:
-    """Sheets since the last time with the unknowns of the present ones, where these come back for the second time.
-
-    Empty before: where active sets change, Newton's method may find its way back once.
-    """
-    same = [number for number, sheets in enumerate(earlier[:-1]) if sheets.same_unknowns(now)]
-    return list(earlier[same[-1] :]) if len(same) > 1 else []
+    """Sheets since the last time with the unknowns of the present ones; empty if there was none, or nothing since."""
+    for number in range(len(earlier) - 2, -1, -1):
+        if earlier[number].same_unknowns(now):
+            return list(earlier[number:])
+    return []
 
 
 def joined_in(cycle: Sequence[Sheets]) -> dict[int, frozenset[int]]:
