@@ -17,7 +17,7 @@ from solvers.mesh.wall_thickness import wall_thickness
 SLENDER = 5.0
 
 #: Facets whose walls are measured.
-WALLS_MEASURED = 400
+WALLS_MEASURED = 64
 
 
 def is_slender(mesh: Mesh) -> bool:
@@ -73,8 +73,8 @@ def _walls(mesh: Mesh) -> _Walls:
 
     sample = np.arange(0, len(rows), max(1, len(rows) // WALLS_MEASURED))
     walls = wall_thickness(corners.mean(axis=1), vectors / areas[:, None], sample)
-    axes = np.linalg.svd(mesh.points - mesh.points.mean(axis=0), full_matrices=False)[2]
-    some = walls <= np.ptp(mesh.points @ axes.T, axis=0).max() / SLENDER
+    x = mesh.points - mesh.points.mean(axis=0)
+    some = walls <= np.ptp(x @ np.linalg.eigh(x.T @ x)[1], axis=0).max() / SLENDER
     chosen, walls = sample[some], walls[some]
     behind = 0.5 * float(walls @ areas[chosen]) * areas.sum() / areas[sample].sum()
     slender = bool(behind >= 0.5 * volumes.sum())
