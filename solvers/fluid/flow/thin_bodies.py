@@ -106,12 +106,13 @@ class ThinBodies:
     def _at(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
         """Sheets at a position, where parts are joined that touching bodies divide here or at the start of the step.
 
-        These depend on both positions alone. Those that a cycle joins depend on the way; see `release`.
+        These depend on both positions alone. Those that a cycle joins depend on the way; see `release`. Where all
+        motions are prescribed, a step has one position: nothing divides in its course, so that nothing is joined.
         """
         alone = self._find(facets, x, {})
         if alone is None:
             return None
-        beside = {} if self._before is None else divided_by_touching(self._before, alone)
+        beside = {} if self._may_close or self._before is None else divided_by_touching(self._before, alone)
         found, self._alone = self._with(alone, facets, x, united(beside, self._held)), alone
         if cycle := recurring(self._tried, found):
             self._held = united(self._held, joined_in(cycle))
