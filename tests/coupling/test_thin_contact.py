@@ -47,9 +47,9 @@ def history_of(folder, **changes):
     return read_history(folder / "out" / "history.csv")
 
 
-def check(history, steps):
+def check(history, steps, most=12):
     assert len(history["time"]) == steps  # no step is repeated
-    assert history["iterations"].max() <= 12  # in the step of the first contact; 5 in others
+    assert history["iterations"].max() <= most  # in the step of the first contact; 5 in others
     assert np.abs(history["fluid.mass"]).max() < 1e-9
     assert np.abs(history["interface.momentum"]).max() < 1e-8
 
@@ -91,7 +91,7 @@ def test_flap_that_opens_again(tmp_path):
 def test_two_soft_flaps_that_open_again(tmp_path):
     """Both bend in contact. The film opens from its end: without the penalty in wedges steps fail there, at 2 s."""
     history = history_of(tmp_path, E=1e5, upper=1e7, end=3.5, back=1.6)
-    check(history, 70)
+    check(history, 70, most=20)  # unknowns come and go in the second step: its solution is looked for twice
     active, flow, time = history["contact.active"], history["flow"], history["time"]
     assert (active[(time > 0.9) & (time < 2.1)] > 0).all()
     assert not active[time > 2.4].any()

@@ -1,16 +1,15 @@
-"""Parts of the fluid that touching bodies divide within a step share nodes, wherever its iterates were."""
+"""Parts of the fluid that iterates of a step divide and join, for ever, share nodes; those divided once do not."""
 
 import numpy as np
 from fluid_setup import block, body
 
 from solvers.fluid.flow.thin_bodies import ThinBodies
-from solvers.fluid.geometry.thin.sheet_cycles import _divided
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.surfaces.surface import Motion
 
 
 def test_flaps_that_touch_and_open_within_a_step():
-    """The film below the end of one is parted from the fluid above it by contact, and joined at the first change."""
+    """The film below the end of one is parted from the fluid above it by contact, and joined where that recurs."""
     grid = uniform([0, 0], [2, 1], [20, 10])
     low, below = block([0.92, -0.2], [0.95, 0.54])
     high, above = block([0.96, 0.3], [0.99, 1.2])
@@ -26,37 +25,22 @@ def test_flaps_that_touch_and_open_within_a_step():
         return Motion(x, 0.0 * x)
 
     apart, touching = at(0.0), at(0.0101)
-    thin, other = (ThinBodies(grid, bodies, (), None) for _ in range(2))
-    parted = other.sheets(facets, touching)
+    thin = ThinBodies(grid, bodies, (), None)
     opened = thin.sheets(facets, apart)
     thin.begin_step()
-    joined = thin.sheets(facets, touching)
+    parted = thin.sheets(facets, touching)
     assert not len(opened.touching)
     assert len(parted.touching)
+    assert thin.sheets(facets, apart).same_unknowns(opened)
+    joined = thin.sheets(facets, touching)  # a cycle: as in a step in which they touch for the first time
     assert joined.node_count(1) < parted.node_count(1)
-    thin.begin_step()
-    assert thin.sheets(facets, touching).same_unknowns(parted)
-    # the step starts where they touch, and iterates part them in vain
-    assert thin.sheets(facets, apart).same_unknowns(opened)
-    assert thin.sheets(facets, touching).same_unknowns(parted)
-    assert not thin.release(facets, touching)
-    assert thin.sheets(facets, apart).same_unknowns(opened)
-    held = thin.sheets(facets, touching)  # a cycle: as in a step in which they touch for the first time
-    assert held.same_unknowns(joined)
     assert thin.release(facets, touching)
     assert thin.sheets(facets, touching).same_unknowns(parted)
-    for position in (apart, touching, apart):
-        thin.sheets(facets, position)
-    assert thin.sheets(facets, touching).same_unknowns(joined)  # it comes back: it belongs to the solution
+    assert thin.sheets(facets, apart).same_unknowns(opened)  # the cycle again: it belongs to the solution
+    assert thin.sheets(facets, touching).same_unknowns(joined)
     assert not thin.release(facets, touching)
-
-
-def test_parts_with_a_common_facet_are_not_divided_if_they_were_two_before():
-    assert _divided([{1, 2}, {2, 3}], [{1, 2}, {2, 3}]) == frozenset()
-    assert _divided([{1, 2, 3}], [{1, 2}, {2, 3}]) == {1, 2, 3}
-    assert _divided([{1, 2}, {2, 3}], [{1, 2, 3}]) == {1, 2, 3}
-    assert _divided([{1}], [{1}, {4}]) == frozenset()
-    assert _divided([], [{1}]) == frozenset()
+    thin.begin_step()
+    assert thin.sheets(facets, touching).same_unknowns(parted)
 
 
 def test_the_start_of_a_step_is_no_iterate():

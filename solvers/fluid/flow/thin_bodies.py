@@ -16,7 +16,7 @@ from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.geometry.pieces import off_boundary
-from solvers.fluid.geometry.thin.sheet_cycles import divided_by_touching, joined_in, recurring, united
+from solvers.fluid.geometry.thin.sheet_cycles import joined_in, recurring, united
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, same_nodes
 from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
@@ -64,10 +64,9 @@ class ThinBodies:
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
         self._closed: NDArray[np.int64] | None = None  #: `Sheets.closed` of this step; None: it has no sheets yet
         self._alone: Sheets | None = None  #: sheets of the latest position, with no part joined
-        self._before: Sheets | None = None  #: those of the accepted position, from which the step starts
         self._tried: list[Sheets] = []  #: sheets of the positions of this step, in their order
-        self._held: Joined = {}  #: parts that a cycle of this step joins
-        self._joined: Joined = {}  #: all parts that are joined in the present sheets
+        self._joined: Joined = {}  #: parts that a cycle of this step joins
+        self._cycle: Sequence[Sheets] = ()  #: the last one of this step
         self._released = False  #: the cycles of this step have been let go once
 
     @property
@@ -104,28 +103,26 @@ class ThinBodies:
         return may_be_thin(grid, facets[self._wet & facets_of_walls(grid, facets, x)], x, most)
 
     def _at(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
-        """Sheets at a position, where parts are joined that touching bodies divide here or at the start of the step.
+        """Sheets at a position, where the parts are joined that a cycle of this step has joined.
 
-        These depend on both positions alone. Those that a cycle joins depend on the way; see `release`. Where all
-        motions are prescribed, a step has one position: nothing divides in its course, so that nothing is joined.
+        These depend on the way; see `release`. Parts that touching bodies divide in a step are not joined as such: the
+        pressures on both sides of bodies that glide along each other differ.
         """
         alone = self._find(facets, x, {})
         if alone is None:
             return None
-        beside = {} if self._may_close or self._before is None else divided_by_touching(self._before, alone)
-        found, self._alone = self._with(alone, facets, x, united(beside, self._held)), alone
+        found, self._alone = self._with(alone, facets, x), alone
         if cycle := recurring(self._tried, found):
-            self._held = united(self._held, joined_in(cycle))
-            found = self._with(alone, facets, x, united(beside, self._held))
+            self._cycle, self._joined = cycle, united(self._joined, joined_in(cycle))
+            found = self._with(alone, facets, x)
         if not (self._tried and self._tried[-1].same_unknowns(found)):
             self._tried.append(found)
         return found
 
-    def _with(self, alone: Sheets, facets: NDArray[np.int64], x: Array, joined: Joined) -> Sheets:
-        self._joined = joined
-        if not same_nodes(alone.parts, joined):
+    def _with(self, alone: Sheets, facets: NDArray[np.int64], x: Array) -> Sheets:
+        if not same_nodes(alone.parts, self._joined):
             return alone
-        found = self._find(facets, x, joined)
+        found = self._find(facets, x, self._joined)
         assert found is not None
         return found
 
@@ -152,18 +149,19 @@ class ThinBodies:
         A solution without them is then looked for from there. If the cycle comes back there is none nearby, and parts
         that it joins belong to the solution. So no solution depends on the way to it.
         """
-        if not self._held or self._released:
+        if not self._joined or self._released:
             return False
         before, self._released = self._sheets, True
-        self._held, self._tried, self._x = {}, [], None
+        self._joined, self._tried, self._x = {}, [], None
         now = self.sheets(facets, motion)
+        self._tried = [*self._cycle, *self._tried]  # the first return to one of these is the cycle again
         assert before is not None
         return now is None or not now.same_unknowns(before)
 
     def begin_step(self) -> None:
         """Start from the accepted position, and search once for thin bodies if there has been none."""
-        self._before, self._tried, self._searched, self._closed = self._alone, [], False, None
-        self._held, self._released = {}, False
+        self._tried, self._searched, self._closed = [], False, None
+        self._cycle, self._released = (), False
         if self._joined:
             self._joined, self._sheets = {}, self._alone
 
@@ -175,10 +173,9 @@ class ThinBodies:
     def restore(self, state: State) -> None:
         """Restore a saved state."""
         self.begin_step()
-        self._before = None
         self.follows, self._searched = bool(state["follows"]), True
         for cell, facet in np.asarray(state["joined"]).tolist():
-            self._held = united(self._held, {cell: frozenset({facet})})
+            self._joined = united(self._joined, {cell: frozenset({facet})})
         if self._possible is not False:
             self._x = self._sheets = self._alone = None
 
