@@ -51,7 +51,8 @@ def test_flap_that_closes_a_duct(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     history = read_history(tmp_path / "out" / "history.csv")
     assert len(history["time"]) == 28  # no step is repeated
-    assert history["iterations"].max() <= 15  # in the steps of the first contact; 3 in others
+    # in the step of the first contact, whose solution is looked for twice since unknowns come and go; 3 in others
+    assert history["iterations"].max() <= 22
     assert (history["contact.active"][history["time"] > 0.9] > 0).all()
     assert history["flow"].max() > 1e-3
     assert abs(history["flow"][-1]) < 1e-6

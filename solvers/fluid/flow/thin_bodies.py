@@ -66,7 +66,6 @@ class ThinBodies:
         self._alone: Sheets | None = None  #: sheets of the latest position, with no part joined
         self._tried: list[Sheets] = []  #: sheets of the positions of this step, in their order
         self._joined: Joined = {}  #: parts that a cycle of this step joins
-        self._cycle: Sequence[Sheets] = ()  #: the last one of this step
         self._released = False  #: the cycles of this step have been let go once
 
     @property
@@ -113,7 +112,7 @@ class ThinBodies:
             return None
         found, self._alone = self._with(alone, facets, x), alone
         if cycle := recurring(self._tried, found):
-            self._cycle, self._joined = cycle, united(self._joined, joined_in(cycle))
+            self._joined = united(self._joined, joined_in(cycle))
             found = self._with(alone, facets, x)
         if not (self._tried and self._tried[-1].same_unknowns(found)):
             self._tried.append(found)
@@ -154,14 +153,12 @@ class ThinBodies:
         before, self._released = self._sheets, True
         self._joined, self._tried, self._x = {}, [], None
         now = self.sheets(facets, motion)
-        self._tried = [*self._cycle, *self._tried]  # the first return to one of these is the cycle again
         assert before is not None
         return now is None or not now.same_unknowns(before)
 
     def begin_step(self) -> None:
         """Start from the accepted position, and search once for thin bodies if there has been none."""
-        self._tried, self._searched, self._closed = [], False, None
-        self._cycle, self._released = (), False
+        self._tried, self._searched, self._closed, self._released = [], False, None, False
         if self._joined:
             self._joined, self._sheets = {}, self._alone
 

@@ -17,8 +17,6 @@ from solvers.fluid.geometry.thin.sheets import Sheets
 
 def recurring(earlier: Sequence[Sheets], now: Sheets) -> list[Sheets]:
     """Sheets since the last time with the unknowns of the present ones; empty if there was none, or nothing since."""
-    if earlier and earlier[-1].same_unknowns(now):
-        return []
     for number in range(len(earlier) - 2, -1, -1):
         if earlier[number].same_unknowns(now):
             return list(earlier[number:])
