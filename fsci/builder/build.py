@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 from fsci.builder.columns import Numbers, build_probes, joined
+from fsci.builder.known_pairs import require_known_pairs
 from fsci.case import Case
 from solvers.api import Scheme, Sentinel, Snapshot
 from solvers.timing import Timer
@@ -49,6 +50,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         from fsci.builder.automatic_pairs import with_pairs
 
         case = with_pairs(case, comm)
+    require_known_pairs(case)
     if case.fluid is not None:
         from fsci.builder.on_first import on_first
         from fsci.meshes.enclosed import require_outlet

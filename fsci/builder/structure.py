@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from fsci.builder.closed_parts import closed_parts
 from fsci.builder.columns import Table
 from fsci.builder.elements import choose_element
 from fsci.builder.loads import build_loads
@@ -205,7 +204,7 @@ def _overlap(case: Case, structure: Structure, name: str) -> probes.Probe:
 def _on_pair(
     case: Case, structure: Structure, name: str, of_contact: Callable[[Contact, int], probes.Probe]
 ) -> probes.Probe:
-    """The probe of a pair of the present contact, which has pairs with walls once they are near. Raises CaseError.
+    """The probe of a pair of the present contact, which has pairs with walls once they are near.
 
     Until then its gap is not a number, and all else is zero.
     """
@@ -213,9 +212,6 @@ def _on_pair(
 
     settings = case.probes[name]
     wanted = settings.pair
-    pairs = [*([] if case.contact is None else case.contact.pairs), *_wall_pairs(case)]
-    if wanted not in pairs:
-        raise case.error(("probes", name, "pair"), f"unknown pair '{wanted}' (available: {', '.join(pairs)})")
     away = nan if settings.quantity in ("gap", "mean_gap", "first_contact") else 0.0
 
     def probe() -> dict[str, float]:
@@ -225,13 +221,6 @@ def _on_pair(
         return of_contact(contact, contact.names.index(wanted))()
 
     return probe
-
-
-def _wall_pairs(case: Case) -> list[str]:
-    """Names of the pairs of elastic bodies with closed faces of the box."""
-    if case.contact_off or case.coupling is None:
-        return []
-    return [f"{body}_{wall.name}" for body in case.elastic_bodies for wall in closed_parts(case)]
 
 
 #: How the probes of a structure are made.

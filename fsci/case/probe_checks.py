@@ -46,7 +46,7 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
         if set(probe.columns(name, 3)) & set(RESERVED_COLUMNS):
             yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
         yield from length_mistakes(probe.at, case.dimension, (*keys, "at"))
-        pairs = [*([] if case.contact is None else case.contact.pairs), *_wall_pairs(case)]
+        pairs = [*([] if case.contact is None else case.contact.pairs), *possible_walls(case)]
         found_later = case.contact is not None and case.contact.bodies is not None
         if probe.pair is not None and probe.pair not in pairs and not found_later:
             yield (*keys, "pair"), f"unknown pair '{probe.pair}'{did_you_mean(probe.pair, pairs)}"
@@ -220,8 +220,8 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
             yield (*keys, "from"), f"'from' must be a time of the run, {span}, not {check.start:g}"
 
 
-def _wall_pairs(case: Case) -> list[str]:
-    """Pairs of elastic bodies with faces of the box, whichever of them may meet."""
+def possible_walls(case: Case) -> list[str]:
+    """Names of the pairs that elastic bodies have with faces of the box, also with open ones."""
     if case.fluid is None or case.coupling is None or case.contact_off:
         return []
     faces = [(name, face) for name, patch in case.fluid.patches.items() for face in patch.on]
@@ -231,6 +231,6 @@ def _wall_pairs(case: Case) -> list[str]:
 
 def _of_walls(case: Case) -> list[str]:
     """Columns of pairs with walls."""
-    pairs = _wall_pairs(case)
+    pairs = possible_walls(case)
     columns = [f"contact.{pair}.{axis}" for pair in pairs for axis in "xyz"[: case.dimension or 3]]
     return [*(CONTACT_COLUMNS if pairs else ()), *columns]

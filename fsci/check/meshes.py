@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.known_pairs import require_known_pairs
 from fsci.builder.skin import find_skin
 from fsci.case import Case, CaseError
 from fsci.case.contact import PairSection
@@ -90,6 +91,8 @@ def _check(case: Case) -> Findings:
         from fsci.builder.automatic_pairs import with_pairs
 
         case = found.attempt(partial(with_pairs, case)) or case
+    if not found.problems:
+        found.attempt(partial(require_known_pairs, case))
     found.pairs = {} if case.contact is None else case.contact.pairs
     _own_laws(case, found)
     _elastic(case, found)

@@ -74,11 +74,14 @@ def _sampling(history: History, check: Check, value: float) -> float:
 
 @dataclass(frozen=True)
 class Distance:
-    """How far apart two curves are; the shift is that in time which makes them agree best [s]."""
+    """How far apart two curves are; the shift is that in time which makes them agree best [s].
+
+    None: no shift takes away half of the sum of squares of their differences, or none that is shorter than the run.
+    """
 
     largest: float
     mean: float
-    shift: float
+    shift: float | None
 
 
 def distance(one: Observed, other: Observed) -> Distance | None:
@@ -92,11 +95,16 @@ def distance(one: Observed, other: Observed) -> Distance | None:
     time, curve, off = time[finite], curve[finite], off[finite]
     if len(time) < 3:
         return None
+    return Distance(float(np.abs(off).max()), float(np.abs(off).mean()), _shift(time, curve, off))
+
+
+def _shift(time: Array, curve: Array, off: Array) -> float | None:
+    """other(t) = one(t - shift), to first order: off = -shift one'."""
     slope = np.gradient(curve, time)
-    steep = float(slope @ slope)
-    # other(t) = one(t - shift), to first order
-    shift = -float(slope @ off) / steep if steep > 0.0 else 0.0
-    return Distance(float(np.abs(off).max()), float(np.abs(off).mean()), shift)
+    steep, along, whole = float(slope @ slope), float(slope @ off), float(off @ off)
+    # the least squares take away along^2 / steep
+    explains = along**2 > 0.5 * steep * whole and abs(along) < steep * (time[-1] - time[0])
+    return -along / steep if explains else None
 
 
 def wanted(case: Case, only: Sequence[str]) -> None:

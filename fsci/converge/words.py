@@ -30,9 +30,10 @@ def sentences(name: str, found: BandedValue, runs: Sequence[Done]) -> Iterator[s
         yield f"  {_twin(twin, words[twin], value, found)}"
     if found.distance is not None and found.scale:
         apart = found.distance
+        shifted = "" if apart.shift is None else f", shifted by {apart.shift:+.2g} in time"
         yield (
             f"  over time, to the next level: {percent(apart.largest / found.scale)} at most, "
-            f"{percent(apart.mean / found.scale)} in the mean, shifted by {apart.shift:+.2g} in time"
+            f"{percent(apart.mean / found.scale)} in the mean{shifted}"
         )
     yield from (f"  {words}" for words in told.words)
 

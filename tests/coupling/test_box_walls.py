@@ -132,7 +132,7 @@ def test_probes_of_pairs_with_walls(tmp_path):
     assert (found["pressure"] > 0.0).tolist() == touching.tolist()
     assert np.abs(found["gap"][touching]).max() < 1e-3
     assert found["first"][-1] == pytest.approx(found["time"][touching][0])
-    for wrong, said in (("roof_y_high", "unknown pair"), ("top_y_high", "available: block_sides_x_low")):
+    for wrong, said in (("roof_y_high", "unknown pair"), ("top_y_high", "did you mean 'block_sides_x_high'")):
         with pytest.raises(CaseError, match=said):
             run(
                 changed(text, ("first_contact, pair: block_floor_y_low", f"gap, pair: block_{wrong}")), tmp_path / wrong

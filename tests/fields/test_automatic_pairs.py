@@ -184,6 +184,30 @@ def test_check_lists_the_pairs(tmp_path):
     assert len(lines) == 3
 
 
+UNKNOWN = """\
+  gap: {quantity: gap, pair: soft_top_high_botom}
+verify:
+  - {value: contact.soft_top_high_bottom.y, reference: 1, relative: 0.1}
+  - {value: contact.soft_top_high_botom.y, reference: 1, relative: 0.1}
+  - {value: contact.atcive, reference: 1, relative: 0.1}
+"""
+
+
+def test_names_that_no_found_pair_has(tmp_path):
+    """`check` and `run` refuse them with the same words, once the pairs are known."""
+    path = write(tmp_path, "bodies: all\n  reach: 0.5")
+    path.write_text(path.read_text() + UNKNOWN)
+    wanted = [
+        "24:30: unknown pair 'soft_top_high_botom'; did you mean 'soft_top_high_bottom'?",
+        "27:13: there is no value 'contact.soft_top_high_botom.y'; did you mean 'contact.soft_top_high_bottom.y'?",
+        "28:13: there is no value 'contact.atcive'; did you mean 'contact.active'?",
+    ]
+    for command in (["check", path], ["run", path, "-o", tmp_path / "out"]):
+        done = fsci(*command)
+        assert done.returncode == 2
+        assert [line for line in done.stderr.splitlines() if "case.yaml" in line] == [f"{path}:{end}" for end in wanted]
+
+
 MISTAKES = {
     "nothing": ("c_n: 1", "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"),
     "unknown": ("bodies: [low, sotf]", "unknown body 'sotf'; did you mean 'soft'?"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fsci.case.verify import Check
-from fsci.converge.values import Observed, chosen, distance, observed
+from fsci.converge.values import Distance, Observed, chosen, distance, observed
 from fsci.running.verify import evaluate
 
 TIME = np.linspace(0.1, 3.0, 30)
@@ -62,6 +62,17 @@ def test_shift_of_curves(late):
     assert found.shift == pytest.approx(late, rel=0.02)
     assert found.largest == pytest.approx(2.0 * abs(late), rel=0.02)
     assert found.mean < found.largest
+
+
+@pytest.mark.parametrize("rest", [0.1, -0.1 * np.sin(2.0 * TIME), -0.1 * np.cos(20.0 * TIME)])
+def test_curves_that_no_shift_explains(rest):
+    """Another size or another swing; and one that is nearly constant, whose shift would be 100,000 times the run."""
+    curve = np.sin(2.0 * TIME)
+    one, other = Observed(0.0, 1.0, 0.0, TIME, curve), Observed(0.0, 1.0, 0.0, TIME, curve + rest)
+    assert distance(one, other).shift is None
+    assert distance(one, one) == Distance(0.0, 0.0, None)
+    one, other = Observed(0.0, 1.0, 0.0, TIME, 1.0 + 1e-6 * TIME), Observed(0.0, 1.0, 0.0, TIME, np.full(30, 1.1))
+    assert distance(one, other).shift is None
 
 
 def test_numbers_have_no_distance():

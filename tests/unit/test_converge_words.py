@@ -1,5 +1,6 @@
 """What `fsci converge` says, by situation."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,11 @@ def test_a_resolved_value():
         "  element q2q1: 5.5794, inside",
         "  over time, to the next level: 0.9 % at most, 0.18 % in the mean, shifted by +0.3 in time",
     ]
+    found = replace(found, distance=Distance(0.05, 0.01, None))
+    assert (
+        list(sentences("drag", found, [done()]))[2]
+        == "  over time, to the next level: 0.9 % at most, 0.18 % in the mean"
+    )
 
 
 def test_false_convergence():
