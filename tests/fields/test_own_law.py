@@ -146,10 +146,10 @@ def test_law_from_another_folder_is_kept_with_the_results(tmp_path):
 
 def test_twins_trust_what_their_case_trusts(tmp_path):
     folder = folder_of(tmp_path, "{law: 'laws.py:Yeoh', parameters: {c10: 2, c20: 0.1, bulk: 50}}")
-    ended = fsci("twin", folder, "--trust", "--only", "processes", "-o", tmp_path / "twins")
+    ended = fsci("twin", folder, "--trust", "--only", "step", "-o", tmp_path / "twins")
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert "trust" not in (tmp_path / "twins" / "twin.json").read_text()
-    assert json.loads((tmp_path / "twins" / "processes" / "summary.json").read_text())["status"] == "finished"
+    assert json.loads((tmp_path / "twins" / "step" / "summary.json").read_text())["status"] == "finished"
 
 
 def test_twins_leave_the_axes_of_a_law_alone(tmp_path):
