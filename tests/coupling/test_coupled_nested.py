@@ -125,7 +125,10 @@ def test_cells_follow_a_free_body(sinking, tmp_path):
     assert np.abs(found["fluid.mass"]).max() < 1e-9
 
 
-@pytest.mark.parametrize(("processes", "end"), [(2, 0.28), pytest.param(3, 0.46, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("processes", "end"),
+    [(2, 0.28), pytest.param(2, 0.46, marks=pytest.mark.slow), pytest.param(3, 0.28, marks=pytest.mark.slow)],
+)
 def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
     """While it sinks by more than one large cell."""
     folder, whole = sinking
