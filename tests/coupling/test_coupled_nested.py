@@ -125,7 +125,10 @@ def test_cells_follow_a_free_body(sinking, tmp_path):
     assert np.abs(found["fluid.mass"]).max() < 1e-9
 
 
-@pytest.mark.parametrize(("processes", "end"), [(3, 0.28), pytest.param(2, 0.46, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("processes", "end"),
+    [(2, 0.28), pytest.param(2, 0.46, marks=pytest.mark.slow), pytest.param(3, 0.28, marks=pytest.mark.slow)],
+)
 def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
     """While it sinks by more than one large cell."""
     folder, whole = sinking
@@ -139,8 +142,9 @@ def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
 
 
 @pytest.mark.parametrize("text", [NESTED, BALL], ids=["post", "ball"])
-def test_two_processes(text, tmp_path):
-    one = run(text, tmp_path)
+def test_two_processes(text, tmp_path, nested):
+    one = nested[1] if text is NESTED else run(text, tmp_path)
+    (tmp_path / "case.yaml").write_text(text)
     done = fsci("run", tmp_path, "-o", tmp_path / "two", "--set", "verify=[]", processes=2)
     assert done.returncode == 0, done.stdout + done.stderr
     two = read_history(tmp_path / "two" / "history.csv")

@@ -102,11 +102,24 @@ def test_levels_of_nested_cells_look_at_nodes_of_the_mesh_alone(monkeypatch):
     assert len(asked) == 2 * (len(levels) - 1)  # for copies, and for values
 
 
-@pytest.mark.parametrize("cells", [equal_cells, nested_cells])
-@pytest.mark.parametrize("end", [SEALS, OPEN])
+#: element, cells, time step, grid, where the plate ends: each pair of them is in one quick test; the others are slow
+QUICK_PLATES = (
+    ("q1q1", 10, None, equal_cells, SEALS), ("q1q1", 10, None, nested_cells, OPEN),
+    ("q1q1", 10, 0.01, equal_cells, OPEN), ("q1q1", 10, 0.01, nested_cells, SEALS),
+    ("q2q1", 6, None, equal_cells, OPEN), ("q2q1", 6, None, nested_cells, SEALS),
+)  # fmt: skip
+ALL_PLATES = [
+    (element, count, dt, cells, end)
+    for element, count in (("q1q1", 10), ("q2q1", 6))
+    for dt in (None, 0.01)
+    for cells in (equal_cells, nested_cells)
+    for end in (SEALS, OPEN)
+]
+
+
 @pytest.mark.parametrize(
-    ("element", "count", "dt"),
-    [("q1q1", 10, None), ("q1q1", 10, 0.01), ("q2q1", 6, None), pytest.param("q2q1", 6, 0.01, marks=SLOW)],
+    ("element", "count", "dt", "cells", "end"),
+    [pytest.param(*plate, marks=() if plate in QUICK_PLATES else SLOW) for plate in ALL_PLATES],
 )
 def test_as_many_iterations_as_around_a_thick_plate(element, count, end, cells, dt):
     """And the solution of the direct solver."""

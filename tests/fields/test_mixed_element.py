@@ -252,10 +252,11 @@ solver: {newton: {residual: 1e-11}}
 """
 
 
-def test_processes(tmp_path):
+@pytest.mark.parametrize("several", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_processes(several, tmp_path):
     (tmp_path / "case.yaml").write_text(CASE)
     found = []
-    for processes in (1, 3):
+    for processes in (1, several):
         done = fsci("run", tmp_path, "-o", tmp_path / str(processes), processes=processes)
         assert done.returncode == 0, done.stdout + done.stderr
         found.append(read_history(tmp_path / str(processes) / "history.csv"))
