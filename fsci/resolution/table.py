@@ -42,11 +42,14 @@ def curves(rows: Sequence[Mapping[str, float | int | str]], by: str) -> Table:
     return {key: [sorted(points) for points in found.values()] for key, found in scenes.items()}
 
 
-def error(kind: Kind, element: str, cells: float) -> float:
-    """Error of a force [%] at so many cells in the boundary layer or gap: the mean of the scenes."""
+def error(kind: Kind, element: str, cells: float, by: Literal["cells", "across"] = "cells") -> float:
+    """Error of a force [%] at so many cells in the boundary layer or gap: the mean of the scenes.
+
+    by: of films with q2q1 "cells" are those along the film, and "across" those at its narrowest place.
+    """
     if not math.isfinite(cells):
         return 0.0
-    scenes = table()[kind, element]
+    scenes = table(by)[kind, element]
     least = min(curve[0][0] for curve in scenes)
     found = [_on_curve(curve, cells, ORDER[kind]) for curve in scenes if curve[0][0] <= max(cells, least)]
     return math.exp(sum(map(math.log, found)) / len(found))

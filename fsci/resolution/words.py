@@ -30,7 +30,7 @@ class Resolved:
 
     body: str
     to: str  #: what is opposite; empty: the body itself, apart from its narrow gaps
-    cells: float  #: in the boundary layer or the gap
+    cells: float  #: in the boundary layer or the gap; along it for films of bodies without edges with q2q1
     least: float  #: across the body, or at the narrowest place of the gap
     facets: float  #: facets per cell
     share: float  #: of the force on the body
@@ -100,18 +100,31 @@ def _of_body(body: BodyCells, element: str) -> Resolved:
 def _of_gaps(body: BodyCells, element: str) -> Iterator[Resolved]:
     for gap in body.gaps:
 
-        def errors(element: str, cells: float, gap: GapCells = gap) -> float:
-            return gap.share * error("film", element, cells)
+        def errors(element: str, finer: float, gap: GapCells = gap) -> float:
+            return gap.share * _of_film(body, gap, element, finer)
 
-        off = errors(element, gap.cells)
+        off, along = errors(element, 1.0), _along(body, element)
+        cells = gap.along if along else gap.cells
         text = (
             f"body '{gap.body}': {_number(gap.least)} cells in the gap to {_other(gap)} at its narrowest, "
-            f"{_number(gap.cells)} where the force acts, {_off(off)}"
+            f"{_number(cells)} {'along it ' if along else ''}where the force acts, {_off(off)}"
         )
         if off >= WARNED:
-            finer = cells_for(partial(errors, element), GOOD_ERROR, gap.cells) / gap.cells
-            text += _remedy(errors, element, gap.cells, f"{_number(finer)} times as many cells there")
-        yield Resolved(body.body, gap.to, gap.cells, gap.least, body.facets, gap.share, off, text)
+            finer = cells_for(partial(errors, element), GOOD_ERROR, 1.0)
+            text += _remedy(errors, element, 1.0, f"{_number(finer)} times as many cells there")
+        yield Resolved(body.body, gap.to, cells, gap.least, body.facets, gap.share, off, text)
+
+
+def _along(body: BodyCells, element: str) -> bool:
+    """Whether the cells along films decide: across, parabolas of q2q1 are exact; at edges films end in a cell."""
+    return element == "q2q1" and not body.sharp
+
+
+def _of_film(body: BodyCells, gap: GapCells, element: str, finer: float) -> float:
+    """Error [%] of the force in a film with so many times finer cells."""
+    if _along(body, element):
+        return error("film", element, finer * gap.along)
+    return error("film", element, finer * gap.cells, "across" if element == "q2q1" else "cells")
 
 
 def _other(gap: GapCells) -> str:

@@ -8,11 +8,14 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from fluid_setup import block as rectangle
+from fluid_setup import field, make_fluid, solve_steady
 from mpi4py import MPI
 from programs import fsci, on_processes
 
 from fsci import shapes
 from fsci.bench import resolution as bench
+from fsci.bench.studies import approaching, drag_of_film
 from fsci.case import load_case
 from fsci.report.report import report
 from fsci.resolution import table as tables
@@ -166,6 +169,30 @@ def test_bodies_before_the_flow():
         assert found.across == pytest.approx(across)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+@pytest.mark.parametrize("half", [False, True])
+def test_length_of_a_film(half, scale):
+    """Between a cylinder and a wall what acts is (1 + x^2 / l^2)^-2, l^2 = 2 a g, over (pi / 2)^2 / (5 pi / 16) l."""
+    gap, h = 0.01, 0.02
+    grid = uniform([0.0 if half else -2.0 * scale, 0.0], [2.0 * scale, 3.0 * scale], [100 if half else 200, 150])
+    disc = scale * corners_of(shapes.disc(1.0, [2000, 1]), (0.0, 1.0 + gap))
+    walls = [(WallPlane(1, 0), "y-"), *([(WallPlane(0, 0, mirror=True), "x-")] if half else [])]
+    (found,) = at_start(grid, walls, [("disc", disc)])
+    (film,) = found.gaps
+    assert film.along == pytest.approx(0.8 * np.pi * np.sqrt(2.0 * gap) / h, rel=0.05)  # up to gaps of five cells
+
+
+def test_length_of_films_in_space():
+    """All of a flat film: the root of its area in cells, also of flat ones; a quarter between planes of symmetry."""
+    facets, nodes = tessellate(mesh := shapes.box([0.8, 0.2, 0.5], [1, 1, 1]))
+    corners = (mesh.points[nodes] + [0.0, 0.0, 0.01])[facets]
+    walls = [(WallPlane(2, 0), "z-"), (WallPlane(0, 0, mirror=True), "x-"), (WallPlane(1, 0, mirror=True), "y-")]
+    for high in (20, 60):
+        (found,) = at_start(uniform([0, 0, 0], [1, 1, 1], [20, 40, high]), walls, [("block", corners)])
+        (film,) = (gap for gap in found.gaps if gap.to == "z-")
+        assert film.along == pytest.approx(2.0 * np.sqrt(16 * 8), rel=0.01)
+
+
 # -------------------------------------------------------------------------------------------------------- in the flow
 
 
@@ -287,7 +314,7 @@ def test_words_of_a_body(simple):
 
 def test_words_of_gaps(simple):
     """The error counts by what acts in the gap; names of bodies, of the body itself and of faces."""
-    some = [GapCells("ball", to, 2.0, 1.5, share) for to, share in (("wall", 0.5), ("ball", 0.25), ("y-", 0.01))]
+    some = [GapCells("ball", to, 2.0, 1.5, 7.0, share) for to, share in (("wall", 0.5), ("ball", 0.25), ("y-", 0.01))]
     found = resolved([body(8.0, *some, share=0.24)], "q1q1")
     assert [(one.to, round(one.error, 3), one.warns) for one in found[1:]] == [
         ("wall", 10.0, True),
@@ -303,7 +330,7 @@ def test_words_of_gaps(simple):
 
 
 def test_words_before_the_run(simple):
-    gap = GapCells("ball", "y-", 1.0, 0.9, 0.8)
+    gap = GapCells("ball", "y-", 1.0, 0.9, 7.0, 0.8)
     (about, text), (other, _) = before_the_run(body(1.0, gap), "q1q1", films=True)
     assert (about, other) == (("ball", ""), ("ball", "y-"))
     assert text == (
@@ -324,6 +351,46 @@ def test_the_table_is_that_of_the_benchmark():
         kept = next(r for r in rows if all(r[k] == row[k] for k in ("kind", "scene", "element", "across")))
         assert row["cells"] == pytest.approx(kept["cells"], rel=1e-3)
         assert row["error [%]"] == pytest.approx(kept["error [%]"], rel=1e-2)
+
+
+@pytest.mark.parametrize(("element", "gap", "warns"), [("q2q1", 1.0, False), ("q1q1", 1.0, True), ("q1q1", 0.5, True)])
+def test_films_between_parallel_plates(element, gap, warns):
+    """Driven by a force: with q2q1 the flow is exact at any height (`test_fluid_gap.py`), with q1q1 far too small."""
+    low = 2.31 / 12
+    bodies = [
+        rigid_body("lower", *rectangle([-1, -1], [3, low])),
+        rigid_body("upper", *rectangle([-1, low + gap / 12], [3, 2])),
+    ]
+    patches = [Patch("ends", ("x-", "x+"), "traction", field(0, 0)), Patch("walls", ("y-", "y+"), "no_slip")]
+    fluid = make_fluid(
+        uniform([0, 0], [2, 1], [24, 12]), patches, bodies, element=element, scheme="steady", convection=False,
+        body_force=field(1.0, 0.0),
+    )  # fmt: skip
+    solve_steady(fluid)
+    films = [found for found in resolved(measure(fluid), element) if found.to]
+    assert {found.to for found in films} == {"lower", "upper"}
+    assert [found.warns for found in films] == [warns, warns]
+
+
+@pytest.mark.parametrize(
+    ("element", "gap", "cells"),
+    [("q2q1", 0.2, 0.4), ("q2q1", 0.3, 0.6), ("q2q1", 0.2, 1.5), ("q2q1", 0.05, 0.7), ("q1q1", 0.05, 1.5)],
+)
+def test_films_of_other_heights_than_the_benchmark(element, gap, cells):
+    """A cylinder and a wall: errors above 5 % warn, those below 1 % do not; two of them failed by cells across."""
+    fluid = approaching(element, gap / cells, gap)
+    error = 100.0 * abs(drag_of_film(fluid, gap) - 1.0)
+    assert error > 5.0 or error < 1.0
+    assert any(found.warns for found in resolved(measure(fluid), element)) == (error > 5.0)
+
+
+@pytest.mark.parametrize(("element", "cells"), [("q2q1", 2), ("q2q1", 6), ("q1q1", 5)])
+def test_cylinder_in_a_channel(element, cells):
+    """2D-1 of Schaefer and Turek, c_D = 5.5795: errors above 5 % warn, those below 1 % do not."""
+    fluid = bench.flow_past(None, 20, element, cells)
+    error = 100.0 * abs(2.0 * fluid.force()["cylinder"].sum(axis=0)[0] / (0.2**2 * 0.1) / 5.5795 - 1.0)
+    assert error > 5.0 or error < 1.0
+    assert any(found.warns for found in resolved(measure(fluid), element)) == (error > 5.0)
 
 
 FILM = {

@@ -13,6 +13,7 @@ class GapCells:
     to: str  #: name of the other body, or of the face
     cells: float  #: geometric mean, weighted by what acts there
     least: float  #: cells at the narrowest place
+    along: float  #: along the part of the film in which the force acts
     share: float  #: of the force on the body, as far as a flow explains it
 
 

@@ -9,7 +9,7 @@ Source: J. Ma, S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7-19.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +38,10 @@ class SurfaceSamples:
     area: Array  #: [m^(dim-1)]
     facet: NDArray[np.int64]
     across: Array  #: length of a cell along the normal [m]
+    covers: Array  #: how many cells it covers: its area in the lattice, a cell of which has the size 1
 
     def __getitem__(self, some: NDArray) -> SurfaceSamples:
-        return SurfaceSamples(self.x[some], self.normal[some], self.area[some], self.facet[some], self.across[some])
+        return SurfaceSamples(*(getattr(self, one.name)[some] for one in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,10 @@ def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
     area = np.linalg.norm(vector, axis=1)
     normal = np.divide(vector, area[:, None], out=np.zeros_like(vector), where=area[:, None] > 0.0)
     x = pieces.mean(axis=1)
-    across = 1.0 / np.maximum(np.linalg.norm(normal / _sizes(grid, x), axis=1), 1e-300)
-    found = SurfaceSamples(x, normal, area, facet, across)
+    sizes = _sizes(grid, x)
+    across = 1.0 / np.maximum(np.linalg.norm(normal / sizes, axis=1), 1e-300)
+    covers = area * np.linalg.norm(normal * sizes, axis=1) / sizes.prod(axis=1)  # area vectors map by cofactors
+    found = SurfaceSamples(x, normal, area, facet, across, covers)
     low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
     near = 1e-6 * (high - low)
     return found[((x > low + near) & (x < high - near)).all(axis=1) & (found.area > 0.0)]

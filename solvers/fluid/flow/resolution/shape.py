@@ -119,17 +119,31 @@ def shape_of(scene: SurfaceScene, body: int, acting: Array, counts: Array) -> Bo
 
 
 def _gaps_of(scene: SurfaceScene, body: int, some: NDArray[np.int64], share: Array) -> Iterator[GapCells]:
-    """Gaps in front of some samples, by what is opposite."""
+    """Gaps in front of some samples, by what is opposite.
+
+    A force f per area acts in an area of (int f dA)^2 / int f^2 dA, counted in cells: in all of a film where f is
+    uniform, in 2.5 l between a cylinder of radius a and a plane at the distance g, l^2 = 2 a g, where f ~ 1 / gap^2.
+    Planes of symmetry double it.
+    """
     partner = scene.gaps.partner[some]
     of_bodies = scene.owner[scene.samples.facet[np.maximum(partner, 0)]]
     opposite = np.where(partner < 0, len(scene.bodies) - 1 - partner, of_bodies)
     names = [*scene.bodies, *scene.faces]
     for other in np.unique(opposite).tolist():
         here = some[opposite == other]
-        weight, cells = share[here], np.maximum(scene.gaps.cells[here], 1e-6)
-        total = float(weight.sum())
-        mean = float(np.exp((weight * np.log(cells)).sum() / total)) if total > 0.0 else float(cells.min())
-        yield GapCells(scene.bodies[body], names[other], mean, float(cells.min()), total)
+        weight, cells, covers = share[here], np.maximum(scene.gaps.cells[here], 1e-6), scene.samples.covers[here]
+        total, covered = float(weight.sum()), float(covers.sum())
+        mean = float(cells.min())
+        if total > 0.0:
+            mean, covered = float(np.exp((weight * np.log(cells)).sum() / total)), total**2 / (weight**2 / covers).sum()
+        along = (covered * 2.0 ** _mirrors_at(scene, here)) ** (1.0 / (scene.corners.shape[2] - 1))
+        yield GapCells(scene.bodies[body], names[other], mean, float(cells.min()), float(along), total)
+
+
+def _mirrors_at(scene: SurfaceScene, some: NDArray[np.int64]) -> int:
+    """Number of the planes of symmetry at which some samples end."""
+    x, length = scene.samples.x[some], scene.samples.area[some] ** (1.0 / (scene.corners.shape[2] - 1))
+    return sum(bool((np.abs(x[:, axis] - position) < length).any()) for axis, position in scene.mirrors)
 
 
 def has_edges(corners: Array) -> bool:
