@@ -108,7 +108,7 @@ class Contact:
     # ------------------------------------------------------------------------------------------------- steps
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:
-        """Set the displacements at the start [m] and the diagonal of the stiffness [N/m], both of shape (N, dim)."""
+        """Set the displacements at the start [m] and what resists a contact [N/m], both of shape (N, dim)."""
         self._stiffnesses = ContactStiffness(self.interface, stiffness)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()

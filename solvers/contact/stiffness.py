@@ -1,8 +1,9 @@
 """The stiffness that a gap acts against: that of both sides in series, per area.
 
-A body resists the motion of a node of its surface with the mean diagonal entry k of its tangent there, over the area A
-of the node: a compliance A / k [m/Pa]. Those of a slave node and of the masters opposite of it add up, so that the
-stiffness of a pair does not depend on which side is the slave, and a rigid side adds nothing.
+A body resists the motion of a node of its surface with k, the mean diagonal entry of its tangent there without what a
+surface does not feel of changes of volume, over the area A of the node: a compliance A / k [m/Pa]. Those of a slave
+node and of the masters opposite of it add up, so that the stiffness of a pair does not depend on which side is the
+slave, and a rigid side adds nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ class ContactStiffness:
     """Compliances of the surfaces of an interface at the start of a run."""
 
     def __init__(self, interface: ContactInterface, stiffness: Array):
-        """stiffness: diagonal of the tangent [N/m], shape (N, dim), zero at rigid nodes."""
+        """stiffness: k by direction [N/m], shape (N, dim), zero at rigid nodes."""
         k = stiffness.mean(axis=1)
         areas = np.zeros(len(k))
         for surface, nodes in zip(interface.surfaces, interface.nodes.of_surface, strict=True):

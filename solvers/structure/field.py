@@ -122,7 +122,7 @@ class Structure:
         assert self.constraint is not None
         u, t = self._first
         self._place_bodies(u)
-        stiffness = self.at_constraint(self._assembled_tangent.diagonal(t))
+        stiffness = self.at_constraint(self._assembled_tangent.resistance(t))
         self._place_bodies(self.now.u)
         self.constraint.start(self.at_constraint(u), stiffness, t)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from petsc4py import PETSc
@@ -24,10 +25,14 @@ class Tangent:
         self._combined: PETSc.Mat | None = None
         self._dynamic: tuple[TimeScheme, float, PETSc.Mat | None] | None = None  # D, with its scheme and step
 
-    def diagonal(self, t: float) -> Array:
-        """Diagonal of K [N/m] at owned dofs, at the time t [s] of the loads (collective)."""
+    def resistance(self, t: float) -> Array:
+        """Stiffness [N/m] that owned dofs resist a contact with, at the time t [s] of the loads (collective).
+
+        That is the diagonal of K, times E* over the modulus of a change of volume that it contains (`of_surfaces`).
+        """
         self._assemble_bodies(t)
-        return np.concatenate([matrix.getDiagonal().array for matrix in self._matrices])
+        parts = zip(self._matrices, self._bodies, strict=True)
+        return np.concatenate([matrix.getDiagonal().array * of_surfaces(matrix, body) for matrix, body in parts])
 
     def assemble(self, structure: MovingStructure, time: TimeScheme) -> PETSc.Mat:
         """The tangent without supports; the next call overwrites the matrix (collective)."""
@@ -72,3 +77,26 @@ class Tangent:
             self._dynamic = time, structure.current.dt, time.dynamic_stiffness(structure, structure.current.dt)
         assert self._dynamic is not None
         return self._dynamic[2]
+
+
+def of_surfaces(matrix: PETSc.Mat, body: Body) -> float:
+    """Modulus of a half-space against that of uniaxial strain, E* / M = 4 (G / M) (1 - G / M), of a body (collective).
+
+    A surface escapes sideways: E* = 4 G (M - G) / M stays finite where the material is nearly incompressible and
+    M = lambda + 2 G is not. G and M are those of the energies u K u of uniform strains: means over the body.
+    Source: Johnson, Contact Mechanics (1985), section 2.2, for E* = E / (1 - nu^2).
+    """
+    dim, u, comm = body.domain.dim, matrix.createVecRight(), body.domain.comm
+    x, force = body.points[:dim, : body.owned], u.duplicate()
+    x = x - comm.allreduce(x.sum(axis=1))[:, None] * dim / u.getSize()  # from the mean node
+
+    def energy(strain: Array) -> float:
+        u.array[:] = (strain @ x).T.ravel()
+        matrix.mult(u, force)
+        return float(force.dot(u))
+
+    axes, pairs = np.eye(dim), list(combinations(range(dim), 2))
+    uniaxial = sum(energy(np.outer(e, e)) for e in axes) / dim
+    shear = sum(energy((np.outer(axes[i], axes[j]) + np.outer(axes[j], axes[i])) / 2.0) for i, j in pairs) / len(pairs)
+    ratio = min(shear / uniaxial, 0.5) if uniaxial > 0.0 < shear else 0.5  # of an unstable material: as it is
+    return 4.0 * ratio * (1.0 - ratio)
