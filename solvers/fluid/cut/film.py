@@ -32,10 +32,10 @@ LEAST_RATIO = 0.1
 OCTANT = np.sin(np.pi / 8)
 #: Product of the unit normals below which two walls are opposite: the angle between them is at most 60 degrees.
 OPPOSITE = -0.5
-#: Share of the section of its cell, normal to n, that a wall of a film has at least. A notch, as between the facets of a
-#: disc and the end of a flag in it, is no film: without the penalty its few drops of fluid would determine the nodes of
-#: the whole cell. FSI1 does not converge with 1e-2 and a disc of 100 facets, whose notch is 3 % of a cell. From 1e-4 to
-#: 0.3 drags of films are the same to 2e-4.
+#: Share of the section of its cell, normal to n, that a wall of a film has at least. A notch, as between the facets of
+#: a disc and the end of a flag in it, is no film: without the penalty its few drops of fluid would determine the nodes
+#: of the whole cell. FSI1 does not converge with 1e-2 and a disc of 100 facets, whose notch is 3 % of a cell. From 1e-4
+#: to 0.3 drags of films are the same to 2e-4.
 LEAST_WALL = 0.1
 
 
@@ -121,10 +121,10 @@ def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, leng
         return np.stack([np.bincount(group, column) for column in values.T], axis=1)
 
     n, middle = total(area[:, None] * normal), total(np.einsum("pv,pvi->pi", lengths, x[corners]))
-    areas = np.bincount(group, area)
-    middle, n = middle / areas[:, None], n / np.linalg.norm(n, axis=1, keepdims=True)
+    areas = total(area[:, None])
+    middle, n = middle / areas, n / np.linalg.norm(n, axis=1, keepdims=True)
     order = np.argsort(cell[first], kind="stable")
-    return Walls(cell[first][order], middle[order], n[order], areas[order])
+    return Walls(cell[first][order], middle[order], n[order], areas[order, 0])
 
 
 def at_ends(grid: Grid, periodic: tuple[int, ...]) -> list[str]:
