@@ -12,7 +12,7 @@ from coupling.contact_surfaces import global_dofs
 from coupling.divided_facets import divide_facets
 from coupling.ties import Tie, candidate_facets, join_vertices, tied_sides
 from solvers.algebra.blocks import Layout
-from solvers.algebra.sparse import Sparse
+from solvers.algebra.sparse import Sparse, sparse_from_entries
 from solvers.api import Array
 from solvers.mesh.skin import Skin
 from solvers.structure.field import Structure
@@ -45,7 +45,31 @@ def wetted_surfaces(
     touching += [] if near_walls is None else [near_walls.ravel()]
     dofs = np.concatenate([np.empty(0, dtype=np.int64), *touching])
     surfaces = [_wetted_surface(structure, index, skin, ties, dofs) for index, skin in enumerate(skins)]
-    return joined(surfaces, [skin.points for skin in skins]) if ties else surfaces
+    if not ties and all(surface.mixture is None for surface in surfaces):
+        return surfaces
+    return joined(surfaces, [skin.points for skin in skins])
+
+
+def bulge(skin: Skin) -> Sparse | None:
+    """Vertices from the nodes of a second-order surface, (n, n); None: all are nodes.
+
+    A vertex in the middle of corners lies farther from their mean m than its node x, at m + 4/3 (x - m). So segments
+    and triangles enclose what the parabolas of the facets enclose, up to fourth order. A uniform pressure on them has
+    the nodal forces of the element, 1/6, 2/3, 1/6 of its resultant on a straight edge; through the nodes these would be
+    1/4, 1/2, 1/4, and a plane surface would not stay plane.
+    """
+    if not skin.middles:
+        return None
+    count = len(skin.points)
+    rows, columns, values = [np.arange(count)], [np.arange(count)], [np.ones(count)]
+    for middles in skin.middles:
+        share = np.full(middles.shape, -1.0 / 3.0 / (middles.shape[1] - 1))
+        share[:, 0] = 1.0 / 3.0
+        rows.append(np.repeat(middles[:, 0], middles.shape[1]))
+        columns.append(middles.ravel())
+        values.append(share.ravel())
+    at = np.concatenate(rows), np.concatenate(columns)
+    return sparse_from_entries(*at, np.concatenate(values), (count, count))
 
 
 def _wetted_surface(
@@ -55,10 +79,14 @@ def _wetted_surface(
     body = bodies[index]
     layout = Layout(body.domain.comm, [other.size for other in bodies])
     dofs = global_dofs(layout, index, body, skin.nodes)
-    in_contact = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
+    touches = np.isin(dofs[:, 0], touching)
+    in_contact = touches[skin.facets].all(axis=1)
     candidates = candidate_facets(body.name, skin, ties)
     if not candidates:
-        return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, in_contact)
+        # surfaces in contact, and both sides of a tie, meet at their nodes
+        bulged = None if touches.any() else bulge(skin)
+        points = skin.points if bulged is None else bulged @ skin.points
+        return WettedSurface(body.name, points, dofs, skin.facets, skin.wet, in_contact, mixture=bulged)
     divided = divide_facets(skin.points, skin.facets, candidates)
     mixture, of = divided.mixture, divided.parents
     return WettedSurface(

@@ -9,7 +9,7 @@ from fsci.builder.outside import surround
 from fsci.case import Case
 from fsci.meshes.mesh import MeshError, require_surface
 from solvers.mesh.mesh import Mesh
-from solvers.mesh.skin import Skin, cut_out_skin
+from solvers.mesh.skin import Skin, cut_out_skin, middle_vertices
 from solvers.mesh.tessellation import tessellate
 
 
@@ -34,7 +34,8 @@ def _find(case: Case, body: str, mesh: Mesh) -> tuple[Skin, Closing | None]:
     facets, nodes = tessellate(mesh, names)
     given, points = case.coupling.dry_side[body], mesh.points[nodes]
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-    skin, inside = Skin(points, facets, nodes, np.ones(len(facets), dtype=bool)), mesh.points[mesh.cells].mean(axis=1)
+    skin = Skin(points, facets, nodes, np.ones(len(facets), dtype=bool), middle_vertices(mesh, nodes))
+    inside = mesh.points[mesh.cells].mean(axis=1)
     if given == "outside":
         return skin, surround(points, facets, inside, box)
     return skin, close(points, facets, inside, np.array(given), box)

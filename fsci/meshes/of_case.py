@@ -107,8 +107,7 @@ def _meets_others(case: Case, name: str, mesh: Mesh) -> bool:
     """Whether a body is in the box of a flow at the start, or in contact that is no tie.
 
     First order is more robust in contact, where second-order surfaces are clipped as linear parts, and the kinks
-    between them make the active set change. A flow sees linear parts, too: a uniform pressure has not the nodal forces
-    of the element, 1/4, 1/2, 1/4 for 1/6, 2/3, 1/6.
+    between them make the active set change. In a flow tetrahedra get the pressure as on linear parts.
     """
     if case.coupling is not None and case.fluid is not None:
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)

@@ -75,13 +75,17 @@ probes:
 """
 
 
-@pytest.mark.parametrize("corners", ["[[0, 0], [1, 0]]", "[[1, 0], [0, 0]]", "[[1.3, -0.2], [-0.1, -5]]"])
-def test_column_on_a_block(corners, tmp_path):
+@pytest.mark.parametrize(
+    ("corners", "order"),
+    [("[[0, 0], [1, 0]]", 1), ("[[0, 0], [1, 0]]", 2), ("[[1, 0], [0, 0]]", 2), ("[[1.3, -0.2], [-0.1, -5]]", 1)],
+)
+def test_column_on_a_block(corners, order, tmp_path):
     """One dimension: E/2 (s^2 - 1) s = -rho g H with the stretch s and the height H = 0.6 - 0.1 s, to rounding.
 
     The ends of the wetted surface slide down with it; corners on the boundary of the box or outside are the same.
     """
-    history = run(COLUMN.replace("[[0, 0], [1, 0]]", corners), tmp_path)
+    case = COLUMN.replace("[[0, 0], [1, 0]]", corners).replace("[4, 1]", f"[4, 1], order: {order}")
+    history = run(case, tmp_path)
     stretch = brentq(lambda s: 0.5e5 * (s**2 - 1) * s + 1e4 * (0.6 - 0.1 * s), 0.9, 1.0, xtol=1e-15)
     height = 0.6 - 0.1 * stretch
     expected = {"top.y": 0.1 * (stretch - 1), "force.y": -1e4 * height, "volume": height, "pressure": 3000.0}

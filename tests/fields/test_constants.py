@@ -208,6 +208,14 @@ def test_walls_of_a_film(monkeypatch):
     assert force < 1.1 * wanted[1]  # both are negative
 
 
+@pytest.mark.parametrize("least", [1e-4, 1e-3, 0.3])
+def test_least_wall_of_a_film(monkeypatch, least):
+    """Films run through whole cells, notches are smaller."""
+    wanted = drag_in_films()
+    monkeypatch.setattr(film, "LEAST_WALL", least)
+    assert drag_in_films() == pytest.approx(wanted, rel=2e-4)
+
+
 def drags_of_films():
     """Of a cylinder over a wall, over the exact one, in gaps of a fifth, a tenth and a twentieth of a cell."""
     return [drag_ratio(2, gap * 0.1, 0.1, "q2q1") for gap in (0.2, 0.1, 0.05)]

@@ -57,6 +57,24 @@ def test_between_a_body_and_a_face_of_the_box(gap):
     assert scene(plate("plate", gap, 0.4), walls=("x-", "y+")).cut.film is None  # y- is open
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])
+@pytest.mark.parametrize("size", [1.0, 1e-3])
+def test_a_notch_is_no_film(angle, size):
+    """A wall as long as a cell is 0.3 cells away from an opposite one, across: that has 1 % of the cell, or half."""
+    grid = uniform([0, 0], [size, size], [10, 10])
+    n, middle = np.array([np.cos(angle), np.sin(angle)]), np.full(2, 0.45 * size)
+    cells = np.array([44, 44])
+    section = H * size / np.abs(n).max()
+
+    def factor(share):
+        x = np.stack([middle, middle - 0.3 * H * size * n])
+        walls = film.Walls(cells, x, np.stack([n, -n]), section * np.array([1.0, share]))
+        return film.Films((), 0.1).factor(grid, walls, np.zeros(grid.size, dtype=bool))
+
+    assert factor(0.01) is None
+    assert (factor(0.5) < 1.0).sum() == 1
+
+
 def test_no_film():
     """Not across the solid of a thin body, not where walls are a cell apart, not with first order."""
     assert scene(plate("thin", 0.43, 0.46)).cut.film is None
