@@ -443,6 +443,8 @@ def test_solids_in_space_are_not_plane():
 THIN = {"hydrostatic_contact": 1, "piston_impact": 1, "torus_wall": 1, "valve": 2, "valve_3d": 3, "valve_thin": 2}
 #: The same: few cells across a rigid body.
 COARSE = {"thin_flag": 1}
+#: The same: few cells in and along gaps between discs.
+GAPS = {"hopper": 9}
 #: Cases whose bodies have cells of first order and do not bend, or as in the paper they are from.
 FIRST_ORDER = {
     "elastic_bar_column": 1,
@@ -463,6 +465,7 @@ def test_cases_that_are_right(name):
         name, 0
     )
     said = [*case.warnings, *found.warnings]
-    counts = [sum(words in line for line in said) for words in ("thick", "cells across the body: forces were")]
-    assert counts == [THIN.get(name, 0), COARSE.get(name, 0)]
+    texts = ("thick", "cells across the body: forces were", "along it where the force acts")
+    counts = [sum(words in line for line in said) for words in texts]
+    assert counts == [some.get(name, 0) for some in (THIN, COARSE, GAPS)]
     assert len(said) == sum(counts), said
