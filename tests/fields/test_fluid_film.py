@@ -75,6 +75,24 @@ def test_a_notch_is_no_film(angle, size):
     assert (factor(0.5) < 1.0).sum() == 1
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
+def test_a_film_goes_on_into_corners_of_cells(angle):
+    """Walls of 1 % of a cell, 0.3 cells apart as the wide ones beside them. Two cells farther they are a notch."""
+    grid = uniform([0, 0], [1, 1], [10, 10])
+    n = np.array([np.cos(angle), np.sin(angle)])
+    along, section = np.array([-n[1], n[0]]), H / np.abs(n).max()
+
+    def films(cell, way):
+        middles = 0.45 * np.ones(2), 0.45 * np.ones(2) + way * H * along
+        x = np.concatenate([[middle, middle - 0.3 * H * n] for middle in middles])
+        cells, areas = (np.repeat(some, 2) for some in ([44, cell], [section, 0.01 * section]))
+        walls = film.Walls(cells, x, np.stack([n, -n, n, -n]), areas)
+        return np.flatnonzero(film.Films((), 0.1).factor(grid, walls, np.zeros(grid.size, dtype=bool)) < 1.0).tolist()
+
+    assert films(54, 0.6) == [44, 54]
+    assert films(64, 1.6) == [44]
+
+
 def test_no_film():
     """Not across the solid of a thin body, not where walls are a cell apart, not with first order."""
     assert scene(plate("thin", 0.43, 0.46)).cut.film is None

@@ -32,10 +32,10 @@ LEAST_RATIO = 0.1
 OCTANT = np.sin(np.pi / 8)
 #: Product of the unit normals below which two walls are opposite: the angle between them is at most 60 degrees.
 OPPOSITE = -0.5
-#: Share of the section of its cell, normal to n, that a wall of a film has at least. A notch, as between the facets of
-#: a disc and the end of a flag in it, is no film: without the penalty its few drops of fluid would determine the nodes
-#: of the whole cell. FSI1 does not converge with 1e-2 and a disc of 100 facets, whose notch is 3 % of a cell. From 1e-4
-#: to 0.3 drags of films are the same to 2e-4.
+#: Share of the section of its cell, normal to n, that a wall of a film has, there or in a cell beside. A notch, as
+#: between the facets of a disc and the end of a flag in it, is no film: without the penalty its few drops of fluid
+#: would determine the nodes of the whole cell. FSI1 does not converge with 1e-2 and a disc of 100 facets, whose notch is 3 %
+#: of a cell. From 1e-4 to 0.3 drags of films are the same to 2e-4.
 LEAST_WALL = 0.1
 
 
@@ -48,6 +48,9 @@ class Walls:
     n: Array  #: unit normal out of the fluid, shape (n, dim)
     area: Array  #: [m^(dim-1)], shape (n,)
 
+    def __getitem__(self, some: NDArray[np.bool_]) -> Walls:
+        return Walls(self.cell[some], self.x[some], self.n[some], self.area[some])
+
 
 @dataclass(frozen=True)
 class Films:
@@ -59,16 +62,29 @@ class Films:
 
     def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
         """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film."""
-        walls = without_notches(grid, walls)
-        sizes, across = sizes_of(grid, walls)
-        gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across, periodic=self.periodic))
-        near = gap < (1.0 - FLUSH) * across  # a gap of one cell is no film, whatever the rounding
+        walls = walls[wide_walls(grid, walls) | self._ends(grid, walls)]
+        gap, near, sizes = self._gaps(grid, walls)
         if not near.any():
             return None
         ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST_RATIO)
         factor = np.ones(grid.size)
         np.minimum.at(factor, walls.cell[near], SHARE_OF_FILM * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
         return with_solid(grid, factor, solid, self.periodic)
+
+    def _gaps(self, grid: Grid, walls: Walls) -> tuple[Array, NDArray[np.bool_], Array]:
+        """(height of the fluid in front of walls [m], whether that is a film, sizes of their cells [m], (n, dim))."""
+        sizes, across = sizes_of(grid, walls)
+        gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across, periodic=self.periodic))
+        return gap, gap < (1.0 - FLUSH) * across, sizes  # a gap of one cell is no film, whatever the rounding
+
+    def _ends(self, grid: Grid, walls: Walls) -> NDArray[np.bool_]:
+        """Small walls in cells around those of films between wide ones, which go on there."""
+        wide = walls[wide_walls(grid, walls)]
+        of_films = np.zeros(grid.size, dtype=bool)
+        of_films[wide.cell[self._gaps(grid, wide)[1]]] = True
+        around = ndimage.maximum_filter(grid.as_box(of_films), 3, mode=at_ends(grid, self.periodic)).ravel(order="F")
+        found: NDArray[np.bool_] = around[walls.cell]
+        return found
 
 
 def with_solid(grid: Grid, factor: Array, solid: NDArray[np.bool_], periodic: tuple[int, ...] = ()) -> Array:
@@ -84,11 +100,11 @@ def sizes_of(grid: Grid, walls: Walls) -> tuple[Array, Array]:
     return sizes, 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
 
 
-def without_notches(grid: Grid, walls: Walls) -> Walls:
-    """Walls that are large enough for those of a film."""
+def wide_walls(grid: Grid, walls: Walls) -> NDArray[np.bool_]:
+    """Whether walls are LEAST_WALL of their cells or more."""
     sizes, across = sizes_of(grid, walls)
-    wide = walls.area >= LEAST_WALL * sizes.prod(axis=1) / across
-    return Walls(walls.cell[wide], walls.x[wide], walls.n[wide], walls.area[wide])
+    wide: NDArray[np.bool_] = walls.area >= LEAST_WALL * sizes.prod(axis=1) / across
+    return wide
 
 
 def to_faces(grid: Grid, walls: Walls, faces: Sequence[tuple[int, int]]) -> Array:
