@@ -34,8 +34,8 @@ OCTANT = np.sin(np.pi / 8)
 OPPOSITE = -0.5
 #: Share of the section of its cell, normal to n, that a wall of a film has, there or in a cell beside. A notch, as
 #: between the facets of a disc and the end of a flag in it, is no film: without the penalty its few drops of fluid
-#: would determine the nodes of the whole cell. FSI1 does not converge with 1e-2 and a disc of 100 facets, whose notch is 3 %
-#: of a cell. From 1e-4 to 0.3 drags of films are the same to 2e-4.
+#: would determine the nodes of the whole cell. FSI1 does not converge with 1e-2 and a disc of 100 facets, whose notch
+#: is 3 % of a cell. From 1e-4 to 0.3 drags of films are the same to 2e-4.
 LEAST_WALL = 0.1
 
 
