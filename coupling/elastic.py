@@ -92,28 +92,29 @@ class Elastic:
 
     def solve(self) -> StepInfo:
         """Newton's method under the load of the flow; in parts, if it fails for all of its change in this step."""
-        return self._solve_under(self.structure.old.surface, self.structure.now.surface.copy(), HALVINGS_OF_LOAD)
+        return self._solve_from(self.structure.old.surface, HALVINGS_OF_LOAD)
 
-    def _solve_under(self, last: Array, load: Array, halvings: int) -> StepInfo:
-        """Under a load [N]; if that fails, under the mean of it and the last one first. Raises StepFailed.
+    def _solve_from(self, last: Array, halvings: int) -> StepInfo:
+        """Under the present load [N]; if that fails, under the mean of it and the last one first. Raises StepFailed.
 
         The first iterate of a slender body moves by its whole deflection, through what will stop it, and contact begins
         from there.
         """
         structure = self.structure
-        before = structure.now.u.copy()
-        structure.load(load)
+        before, load = structure.now.u.copy(), structure.now.surface.copy()
         try:
             return structure.solve()
         except StepFailed:
             if halvings == 0:
                 raise
-            structure.now.u[:] = before
-            middle = 0.5 * (last + load)
-            first = self._solve_under(last, middle, halvings - 1)
-            then = self._solve_under(middle, load, halvings - 1)
-            residuals = (*first.residuals, *then.residuals)
-            return replace(then, iterations=first.iterations + then.iterations, residuals=residuals)
+        structure.now.u[:] = before
+        middle = 0.5 * (last + load)
+        structure.load(middle)
+        first = self._solve_from(last, halvings - 1)
+        structure.load(load)
+        then = self._solve_from(middle, halvings - 1)
+        residuals = (*first.residuals, *then.residuals)
+        return replace(then, iterations=first.iterations + then.iterations, residuals=residuals)
 
     def check(self, info: StepInfo) -> None:
         self.structure.check_deformation(info.iterations, info.residuals)
