@@ -22,9 +22,9 @@ from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
 from solvers.structure.saved import from_bodies, per_body
 
-#: Halvings of the change of a load for which Newton fails. A flap that doubled pressure presses on a stop needs
-#: one, with stiffnesses of contact from 0.02 to 1 of that of uniaxial strain; a step that must fail costs one solution
-#: more for each.
+#: Halvings of the change of a load, where Newton's method fails for all of it. A flap on a stop under a pressure that
+#: doubles needs one, with c_n from 0.02 to 1 times the stiffness of uniaxial strain. A step that must fail costs one
+#: solution more for each.
 HALVINGS_OF_LOAD = 2
 
 

@@ -71,6 +71,15 @@ def test_steady_contact_converges(tmp_path, settings):
     assert force < -3.0
 
 
+@pytest.mark.parametrize("factor", [0.2, 0.5, 0.8])
+def test_a_load_that_is_too_large_comes_in_halves(tmp_path, factor, monkeypatch):
+    """Whatever c_n is: with all of the load at once elements are inverted in the second step."""
+    monkeypatch.setattr("solvers.structure.tangent.of_surfaces", lambda matrix, body: factor)
+    tip, force = final(tmp_path, "run", scheme="partitioned")
+    assert 0.08 < tip < 0.09
+    assert force < -3.0
+
+
 def test_result_is_that_with_a_tight_layer(tmp_path):
     """A layer of 1e-4 closes all slits by itself. Half the step and a thousandth of the size change nothing."""
     tip, force = final(tmp_path, "sealed", film="  film: {seal: 1.0e-4}\n")

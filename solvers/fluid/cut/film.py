@@ -62,10 +62,14 @@ class Films:
 
     def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
         """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film."""
-        walls = walls[wide_walls(grid, walls) | self._ends(grid, walls)]
-        gap, near, sizes = self._gaps(grid, walls)
+        wide = wide_walls(grid, walls)
+        gap, near, sizes = self._gaps(grid, walls[wide])
         if not near.any():
             return None
+        ends = ~wide & self._around(grid, walls.cell[wide][near])[walls.cell]
+        walls = walls[wide | ends]
+        if ends.any():
+            gap, near, sizes = self._gaps(grid, walls)
         ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST_RATIO)
         factor = np.ones(grid.size)
         np.minimum.at(factor, walls.cell[near], SHARE_OF_FILM * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
@@ -77,13 +81,13 @@ class Films:
         gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across, periodic=self.periodic))
         return gap, gap < (1.0 - FLUSH) * across, sizes  # a gap of one cell is no film, whatever the rounding
 
-    def _ends(self, grid: Grid, walls: Walls) -> NDArray[np.bool_]:
-        """Small walls in cells around those of films between wide ones, which go on there."""
-        wide = walls[wide_walls(grid, walls)]
-        of_films = np.zeros(grid.size, dtype=bool)
-        of_films[wide.cell[self._gaps(grid, wide)[1]]] = True
-        around = ndimage.maximum_filter(grid.as_box(of_films), 3, mode=at_ends(grid, self.periodic)).ravel(order="F")
-        found: NDArray[np.bool_] = around[walls.cell]
+    def _around(self, grid: Grid, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Mask of all cells of the box: those of films between wide walls, and those around, where films go on."""
+        mask = np.zeros(grid.size, dtype=bool)
+        mask[cells] = True
+        found: NDArray[np.bool_] = ndimage.maximum_filter(
+            grid.as_box(mask), 3, mode=at_ends(grid, self.periodic)
+        ).ravel(order="F")
         return found
 
 
