@@ -36,15 +36,14 @@ def flow_element(case: Case) -> FlowElement:
         return FlowElement(case.fluid.element)
     if case.fluid.narrow_gaps:
         return FlowElement("q1q1", "for narrow_gaps")
-    if touching := _may_touch(case):
+    if touching := bodies_that_may_touch(case):
         return FlowElement("q1q1", f"elastic body '{touching[0]}' may touch something in the flow")
     return FlowElement("q2q1", "no elastic body may touch something in the flow")
 
 
-def _may_touch(case: Case) -> list[str]:
-    """Elastic bodies that contact is asked for, or that may reach a wall because nothing holds them."""
-    assert case.fluid is not None
-    if case.contact_off or case.coupling is None:
+def bodies_that_may_touch(case: Case) -> list[str]:
+    """Elastic bodies in a flow that contact is asked for, or that may reach a wall because nothing holds them."""
+    if case.contact_off or case.coupling is None or case.fluid is None:
         return []
     return [name for name in case.elastic_bodies if name in case.bodies_in_contact or not _held(case, name)]
 

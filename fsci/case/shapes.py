@@ -78,8 +78,8 @@ class ShapeSection(PlacedMesh):
     takes: ClassVar[Mapping[str, Takes]]
     order: Order = setting(
         "auto",
-        "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, and "
-        "in no flow and no contact but ties, else 1",
+        "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, and in "
+        "no contact but ties, else 1",
     )
     if TYPE_CHECKING:
         shape: str

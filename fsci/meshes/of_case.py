@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.case.checks import VECTORS, vectors_of
+from fsci.case.flow_element import bodies_that_may_touch
 from fsci.case.free_checks import free_mistakes
 from fsci.case.mesh import FileMesh
 from fsci.case.mesh import Mesh as MeshSection
@@ -75,7 +76,7 @@ def read_body(case: Case, name: str) -> Mesh:
     try:
         mesh = _elastic_mesh(case, name, settings.mesh)
         _require_dimension(case, name, mesh)
-        if chooses_order(settings.mesh) and not _meets_others(case, name, mesh) and is_slender(mesh):
+        if chooses_order(settings.mesh) and not _may_touch(case, name) and is_slender(mesh):
             mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
@@ -103,16 +104,14 @@ def chooses_order(mesh: MeshSection) -> bool:
     return mesh.order == "auto" and is_meshed_here(mesh)
 
 
-def _meets_others(case: Case, name: str, mesh: Mesh) -> bool:
-    """Whether a body is in the box of a flow at the start, or in contact that is no tie.
+def _may_touch(case: Case, name: str) -> bool:
+    """Whether a body may be in contact that is no tie.
 
     First order is more robust in contact, where second-order surfaces are clipped as linear parts, and the kinks
-    between them make the active set change. In a flow tetrahedra get the pressure as on linear parts.
+    between them make the active set change.
     """
-    if case.coupling is not None and case.fluid is not None:
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-        if (low <= case.fluid.grid.to).all() and (high >= case.fluid.grid.start).all():
-            return True
+    if case.coupling is not None:
+        return name in bodies_that_may_touch(case)
     if case.contact is None:
         return False
     named = case.elastic_bodies if case.contact.bodies == "all" else case.contact.bodies or ()

@@ -171,13 +171,19 @@ FLOW = """{density: 1, viscosity: 1, scheme: bdf2, grid: {from: [0, -1], to: [3,
 
 
 def test_order_in_a_flow(tmp_path):
-    """First order, whose nodes get the right share of a pressure."""
-    more = "structure.dynamics={}", "structure.bodies.beam.material.density=1", "coupling={}"
-    case = load(tmp_path, f"fluid={FLOW}", *more, "kinematics=finite")
-    assert read_body(case, "beam").cell_type == "quad"
-    beside = "mesh={shape: rectangle, size: [1, 0.1], cells: [20, 2], origin: [9, 0]}"
-    case = load(tmp_path, f"fluid={FLOW}", *more, "kinematics=finite", beside, "probes={}")
+    """Slender bodies that are held have second order, as without a flow; those that may touch something first."""
+    more = "structure.dynamics={}", "structure.bodies.beam.material.density=1", "coupling={}", "kinematics=finite"
+    case = load(tmp_path, f"fluid={FLOW}", *more)
     assert read_body(case, "beam").cell_type == "quad9"
+    assert choose_element(case, "beam", read_body(case, "beam")).warnings == ()
+    touching = load(tmp_path, f"fluid={FLOW}", *more, "contact={bodies: all}")
+    body = read_body(touching, "beam")
+    assert body.cell_type == "quad"
+    assert choose_element(touching, "beam", body).warnings != ()
+    free = load(tmp_path, f"fluid={FLOW}", *more, "supports=[]")
+    assert read_body(free, "beam").cell_type == "quad"
+    alone = load(tmp_path, f"fluid={FLOW}", *more, "supports=[]", "contact=none")
+    assert read_body(alone, "beam").cell_type == "quad9"
 
 
 def test_order_in_check_and_messages(tmp_path):

@@ -461,7 +461,8 @@ def test_cases_that_are_right(name):
     case = load_case(CASES / name)
     found = check_meshes(case)
     assert found.problems == []
-    assert [note.endswith("too stiff in bending; take 'order: 2'") for note in found.notes] == [True] * FIRST_ORDER.get(
+    said = [note for note in found.notes if not note.endswith(": cells of second order, since it is slender")]
+    assert [note.endswith("too stiff in bending; take 'order: 2'") for note in said] == [True] * FIRST_ORDER.get(
         name, 0
     )
     said = [*case.warnings, *found.warnings]
