@@ -89,8 +89,9 @@ class InterfaceSentinel:
     """Implements `Sentinel`: energy and momentum pass from one part to the other, and none is made on the way.
 
     The two time schemes weight the forces at both ends of a step differently. So the work of the last step is not known
-    better than the larger one of what the solid and the fluid count: up to this the sum may be wrong. A loss is not
-    reported: where it does not vanish, the schemes that were chosen explain it.
+    better than the larger one of what the solid and the fluid count, nor than their difference where the force changes
+    its sign: up to this the sum may be wrong. A loss is not reported: where it does not vanish, the schemes that were
+    chosen explain it.
     """
 
     def __init__(self, balance: Balance, solid: Solid, *, steady: bool):
@@ -108,8 +109,10 @@ class InterfaceSentinel:
     def look(self, t: float, dt: float) -> Sequence[Finding]:
         """Energy from nothing, and momentum that is lost."""
         balance, found = self._balance, []
-        last = max(map(abs, balance.last_works))
-        self._passed += max(last, dt * abs(balance.supplied))
+        taken, given = balance.last_works
+        larger = max(abs(taken), abs(given))
+        last = max(larger, abs(taken - given))
+        self._passed += max(larger, dt * abs(balance.supplied))
         self._impulse += dt * balance.load
         self._missed += dt * balance.momentum
         self._unsolved += dt * balance.unsolved

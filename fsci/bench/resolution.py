@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 
 from fsci.bench.fluid import CENTRE, DIAMETER, cylinder, cylinder_grid
-from fsci.bench.studies import approaching, drag_of_film
+from fsci.bench.studies import approaching, approaching_block, drag_of_film, force_of_film
 from fsci.bench.table import Row
 from solvers.api import Array
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.resolution.measure import measure
 
 FINEST = 32  #: cells along the diameter of the reference, which q2q1 computes
-GAP = 0.1  #: of a cylinder that approaches a wall, in radii
+FINEST_ACROSS = 4  #: cells across the film of the reference, which q2q1 computes
 
 
 def around(kind: str, name: str, reynolds: int, element: str, cells: int, sides: Sequence[float] | None = None) -> Row:
@@ -27,18 +27,35 @@ def around(kind: str, name: str, reynolds: int, element: str, cells: int, sides:
     return _row(kind, scene, element, found.layer, found.across, error)
 
 
-def film(element: str, cells: float) -> Row:
-    """A cylinder that approaches a wall: cells in the gap where the force acts, and the error of its drag.
+def film(element: str, gap: float, cells: float) -> Row:
+    """A cylinder that approaches a wall: cells in the gap (in radii) where the force acts, and the error.
 
     With q2q1 those along it: across, its parabolas are exact, and errors come from the change along the film.
     """
-    fluid = approaching(element, GAP / cells, GAP)
+    fluid = approaching(element, gap / cells, gap)
     (found,) = measure(fluid)
-    (gap,) = found.gaps
-    error = 100.0 * abs(drag_of_film(fluid, GAP) - 1.0)
-    return _row(
-        "film", f"gap of {GAP:g} radii", element, gap.along if element == "q2q1" else gap.cells, gap.least, error
-    )
+    (narrow,) = found.gaps
+    error = 100.0 * abs(drag_of_film(fluid, gap) - 1.0)
+    counted = narrow.along if element == "q2q1" else narrow.cells
+    return _row("film", f"gap of {gap:g} radii", element, counted, narrow.least, error)
+
+
+def film_with_ends(element: str, gap: float, cells: float) -> Row:
+    """A block that approaches a wall: cells across the gap, and the error of its force.
+
+    With q2q1 times the cells along it: flat films are exact, and each end is off by a part of a cell.
+    """
+    fluid = approaching_block(element, gap / cells, gap)
+    (found,) = measure(fluid)
+    (film,) = found.gaps
+    error = 100.0 * abs(force_of_film(fluid) / _finest_film(gap) - 1.0)
+    error *= film.along if element == "q2q1" else 1.0
+    return _row("ends", f"block, gap of {gap:g} half lengths", element, film.cells, film.least, error)
+
+
+@cache
+def _finest_film(gap: float) -> float:
+    return force_of_film(approaching_block("q2q1", gap / FINEST_ACROSS, gap))
 
 
 def _row(kind: str, scene: str, element: str, cells: float, least: float, error: float) -> Row:

@@ -56,6 +56,25 @@ def approaching(element: str, h: float, gap: float) -> Fluid:
     return _falling("cylinder", points, np.stack([count, np.roll(count, -1)], axis=1), (x, y), element)
 
 
+def approaching_block(element: str, h: float, gap: float) -> Fluid:
+    """The flow around half a block of length 2 and height 0.3 that moves towards a wall, with cells h near both.
+
+    Its sides lie in no plane of the grids of `fsci bench resolution`.
+    """
+    x = graded(0.0, 8.0, (0.0, 1.3), h, 1.15, 1.0)
+    y = graded(0.0, 8.0, (0.0, max(4 * h, round((gap + 0.3) / h) * h)), h, 1.15, 1.0)
+    parts = np.arange(100)[:, None] / 100
+    corner = np.array([[-1.0, gap], [1.0, gap], [1.0, gap + 0.3], [-1.0, gap + 0.3]])
+    points = np.concatenate([a + parts * (b - a) for a, b in zip(corner, np.roll(corner, -1, axis=0), strict=True)])
+    count = np.arange(len(points))
+    return _falling("block", points, np.stack([count, np.roll(count, -1)], axis=1), (x, y), element)
+
+
+def force_of_film(fluid: Fluid) -> float:
+    """On half of the block."""
+    return float(fluid.force()["block"].sum(axis=0)[1])
+
+
 def sphere(element: str, h: float) -> Row:
     """A quarter of a sphere of radius 1 moves towards a wall."""
     begin = process_time()

@@ -15,14 +15,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-Kind = Literal["smooth", "sharp", "film"]  #: a body without and with edges: by its boundary layer; a narrow gap
+#: A body without and with edges: by its boundary layer; a narrow gap; one that ends at edges.
+Kind = Literal["smooth", "sharp", "film", "ends"]
 Curve = Sequence[tuple[float, float]]  #: (cells, error [%]), by increasing cells
 Table = Mapping[tuple[str, str], Sequence[Curve]]  #: (kind, element) -> a curve for each scene
 
 PATH = Path(__file__).parent / "table.json"
 
 #: Power of the cells with which errors fall beyond the table: that of the elements; at edges the pressure is singular.
-ORDER = {"smooth": 2.0, "sharp": 1.0, "film": 2.0}
+ORDER = {"smooth": 2.0, "sharp": 1.0, "film": 2.0, "ends": 2.0}
 #: Errors below this [%] are not told apart.
 LEAST_ERROR = 0.01
 
@@ -42,17 +43,22 @@ def curves(rows: Sequence[Mapping[str, float | int | str]], by: str) -> Table:
     return {key: [sorted(points) for points in found.values()] for key, found in scenes.items()}
 
 
-def error(kind: Kind, element: str, cells: float, by: Literal["cells", "across"] = "cells") -> float:
-    """Error of a force [%] at so many cells in the boundary layer or gap: the mean of the scenes.
-
-    by: of films with q2q1 "cells" are those along the film, and "across" those at its narrowest place.
-    """
+def error(kind: Kind, element: str, cells: float) -> float:
+    """Error of a force [%] at so many cells in the boundary layer or gap, along films with q2q1: mean of the scenes."""
     if not math.isfinite(cells):
         return 0.0
-    scenes = table(by)[kind, element]
+    scenes = table()[kind, element]
     least = min(curve[0][0] for curve in scenes)
     found = [_on_curve(curve, cells, ORDER[kind]) for curve in scenes if curve[0][0] <= max(cells, least)]
     return math.exp(sum(map(math.log, found)) / len(found))
+
+
+def error_of_ends(element: str, cells: float, along: float) -> float:
+    """Error [%] of a film that ends at edges, with so many cells across and along it.
+
+    With q2q1 each end is off by a part of a cell, by the cells across: rows have the error times the cells along.
+    """
+    return error("ends", element, cells) / (max(along, 1.0) if element == "q2q1" else 1.0)
 
 
 def least_error(kind: Kind, element: str, across: float) -> float:

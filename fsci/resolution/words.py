@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from fsci.resolution.table import Kind, cells_for, error, least_error
+from fsci.resolution.table import Kind, cells_for, error, error_of_ends, least_error
 
 if TYPE_CHECKING:
     from solvers.fluid.flow.resolution.cells import BodyCells, GapCells
@@ -30,7 +30,7 @@ class Resolved:
 
     body: str
     to: str  #: what is opposite; empty: the body itself, apart from its narrow gaps
-    cells: float  #: in the boundary layer or the gap; along it for films of bodies without edges with q2q1
+    cells: float  #: in the boundary layer or the gap; along it for films without ends with q2q1
     least: float  #: across the body, or at the narrowest place of the gap
     facets: float  #: facets per cell
     share: float  #: of the force on the body
@@ -101,9 +101,9 @@ def _of_gaps(body: BodyCells, element: str) -> Iterator[Resolved]:
     for gap in body.gaps:
 
         def errors(element: str, finer: float, gap: GapCells = gap) -> float:
-            return gap.share * _of_film(body, gap, element, finer)
+            return gap.share * _of_film(gap, element, finer)
 
-        off, along = errors(element, 1.0), _along(body, element)
+        off, along = errors(element, 1.0), _along(gap, element)
         cells = gap.along if along else gap.cells
         text = (
             f"body '{gap.body}': {_number(gap.least)} cells in the gap to {_other(gap)} at its narrowest, "
@@ -115,16 +115,18 @@ def _of_gaps(body: BodyCells, element: str) -> Iterator[Resolved]:
         yield Resolved(body.body, gap.to, cells, gap.least, body.facets, gap.share, off, text)
 
 
-def _along(body: BodyCells, element: str) -> bool:
-    """Whether the cells along films decide: across, parabolas of q2q1 are exact; at edges films end in a cell."""
-    return element == "q2q1" and not body.sharp
+def _along(gap: GapCells, element: str) -> bool:
+    """Whether the cells along a film decide: across, parabolas of q2q1 are exact."""
+    return element == "q2q1" and not gap.ends
 
 
-def _of_film(body: BodyCells, gap: GapCells, element: str, finer: float) -> float:
+def _of_film(gap: GapCells, element: str, finer: float) -> float:
     """Error [%] of the force in a film with so many times finer cells."""
-    if _along(body, element):
+    if _along(gap, element):
         return error("film", element, finer * gap.along)
-    return error("film", element, finer * gap.cells, "across" if element == "q2q1" else "cells")
+    if gap.ends:
+        return error_of_ends(element, finer * gap.cells, finer * gap.along)
+    return error("film", element, finer * gap.cells)
 
 
 def _other(gap: GapCells) -> str:

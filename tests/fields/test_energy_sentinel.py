@@ -55,6 +55,8 @@ def interface(steps, *, exchanged=0.0, **settings):
 def test_energy_and_momentum_pass_the_interface():
     assert interface([(1.0, 1.0, 0.0)] * 3) == []
     assert interface([(1.0, 0.5, 0.0)]) == []  # time schemes weight forces within a step differently
+    assert interface([(1.0, -1.0, 0.0)]) == []  # nor do they where the force changes its sign within it
+    assert interface([(1.0, -1.0, 0.0)] * 2) == [("energy", "interface")]
     assert interface([(1.0, 0.5, 0.0)] * 3) == [("energy", "interface")]
     assert interface([(1.0, 0.5, 0.0)] * 3, steady=True) == []
     assert interface([(1.0, 0.5, 0.0)] * 3, exchanged=5.0) == [("energy", "interface")]

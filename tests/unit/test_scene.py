@@ -443,8 +443,8 @@ def test_solids_in_space_are_not_plane():
 THIN = {"hydrostatic_contact": 1, "piston_impact": 1, "torus_wall": 1, "valve": 2, "valve_3d": 3, "valve_thin": 2}
 #: The same: few cells across a rigid body.
 COARSE = {"thin_flag": 1}
-#: The same: few cells in and along gaps between discs.
-GAPS = {"hopper": 9}
+#: The same: few cells along the gap of two discs.
+GAPS = {"hopper": 2}
 #: Cases whose bodies have cells of first order and do not bend, or as in the paper they are from.
 FIRST_ORDER = {
     "elastic_bar_column": 1,

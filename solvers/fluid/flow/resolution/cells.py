@@ -13,7 +13,8 @@ class GapCells:
     to: str  #: name of the other body, or of the face
     cells: float  #: geometric mean, weighted by what acts there
     least: float  #: cells at the narrowest place
-    along: float  #: along the part of the film in which the force acts
+    along: float  #: along the film, from edge to edge; without edges along the part of it in which the force acts
+    ends: bool  #: it ends at edges
     share: float  #: of the force on the body, as far as a flow explains it
 
 

@@ -39,6 +39,7 @@ class SurfaceSamples:
     facet: NDArray[np.int64]
     across: Array  #: length of a cell along the normal [m]
     covers: Array  #: how many cells it covers: its area in the lattice, a cell of which has the size 1
+    index: Array  #: x counted in cells, (n, dim)
 
     def __getitem__(self, some: NDArray) -> SurfaceSamples:
         return SurfaceSamples(*(getattr(self, one.name)[some] for one in fields(self)))
@@ -74,7 +75,7 @@ def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
     sizes = _sizes(grid, x)
     across = 1.0 / np.maximum(np.linalg.norm(normal / sizes, axis=1), 1e-300)
     covers = area * np.linalg.norm(normal * sizes, axis=1) / sizes.prod(axis=1)  # area vectors map by cofactors
-    found = SurfaceSamples(x, normal, area, facet, across, covers)
+    found = SurfaceSamples(x, normal, area, facet, across, covers, _index(grid, x))
     low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
     near = 1e-6 * (high - low)
     return found[((x > low + near) & (x < high - near)).all(axis=1) & (found.area > 0.0)]

@@ -7,7 +7,8 @@ change the velocity by U linearly,
 
 U the largest velocity relative to the body within half of its extent around it. Gaps count by what acts there: the
 share of the force in them is the part of int |t - t_0 n| dS over the surface that lies in front of another wall, within
-`NARROW` cells; t is the traction and t_0 the median of its normal part, which the level of the pressure changes.
+`NARROW` cells and the extent of the body; t is the traction and t_0 the median of its normal part, which the level of
+the pressure changes.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from mpi4py import MPI
 from solvers.api import Array
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.resolution.cells import BodyCells
-from solvers.fluid.flow.resolution.shape import NARROW, SurfaceScene, present, scene_of, shape_of, walls_of_box
+from solvers.fluid.flow.resolution.shape import SurfaceScene, is_narrow, present, scene_of, shape_of, walls_of_box
 from solvers.mesh.tessellation import unit_normals
 
 #: Force that friction and dynamic pressure may explain, in multiples of them, around bodies and in films. Around bodies
@@ -52,7 +53,7 @@ def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Ar
     dynamic = fluid.settings.density * speed**2 * wet if fluid.settings.convection else 0.0
     samples, of_flow = scene.samples, scene.of_samples(shear + dynamic)
     all_of_it = scene.of_samples(acting)
-    free = (scene.owner[samples.facet] == body) & (scene.gaps.cells >= NARROW)
+    free = (scene.owner[samples.facet] == body) & ~is_narrow(scene, body)
     around = AROUND_BODIES * float(of_flow[free].sum()) / max(float(all_of_it[free].sum()), 1e-300)
     counts = np.where(free, min(1.0, around) * all_of_it, np.minimum(all_of_it, IN_FILMS * of_flow))
     found = shape_of(scene, body, all_of_it, counts)

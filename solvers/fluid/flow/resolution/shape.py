@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.flow.resolution.cells import BodyCells, GapCells
+from solvers.fluid.flow.resolution.film_length import cells_along, ends_at_edges
 from solvers.fluid.flow.resolution.gaps import SampledGaps, SurfaceSamples, WallPlane, gaps, samples_of
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.terms.boundary.patch_kinds import PatchKind
@@ -45,6 +46,7 @@ class SurfaceScene:
     samples: SurfaceSamples
     gaps: SampledGaps
     mirrors: list[tuple[int, float]]  #: axis and position [m] of the planes of symmetry
+    sharp: NDArray[np.bool_]  #: whether a body has edges
 
     def of_samples(self, by_facet: Array) -> Array:
         """Values that are spread over facets, at the samples: in proportion to their areas."""
@@ -70,7 +72,9 @@ def scene_of(
     found = gaps(grid, samples, [plane for plane, _ in walls])
     mirrors = [(plane.axis, float(grid.edges[plane.axis][-plane.side])) for plane, _ in walls if plane.mirror]
     names, faces = [name for name, _ in bodies], [face for _, face in walls]
-    return SurfaceScene(names, faces, corners, owner, samples, found, mirrors)
+    wet_facets = np.unique(samples.facet)
+    sharp = np.array([has_edges(corners[wet_facets[owner[wet_facets] == body]]) for body in range(len(names))])
+    return SurfaceScene(names, faces, corners, owner, samples, found, mirrors, sharp)
 
 
 def at_start(
@@ -98,46 +102,70 @@ def shape_of(scene: SurfaceScene, body: int, acting: Array, counts: Array) -> Bo
     samples = scene.samples
     some = np.flatnonzero(scene.owner[samples.facet] == body)
     corners = scene.corners[np.unique(samples.facet[some])]
+    per_length = _per_length(scene, some)
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
+    share = counts / max(float(acting[some].sum()), 1e-300)
+    narrow = is_narrow(scene, body)[some]
+    return BodyCells(
+        scene.bodies[body],
+        across=_across(scene, body),
+        layer=np.nan,
+        sharp=bool(scene.sharp[body]),
+        facets=float(1.0 / (edge * per_length)),
+        share=float(share[some[~narrow]].sum()),
+        gaps=tuple(_gaps_of(scene, some, narrow, share)),
+    )
+
+
+def is_narrow(scene: SurfaceScene, body: int) -> NDArray[np.bool_]:
+    """Whether gaps in front of samples are films for a body: in one wider than the body the flow is that around it."""
+    narrow: NDArray[np.bool_] = scene.gaps.cells < min(NARROW, _across(scene, body))
+    return narrow
+
+
+def _across(scene: SurfaceScene, body: int) -> float:
+    """Cells across a body: the longer extent of a rectangle, the middle one in space."""
     points = scene.corners[scene.owner == body].reshape(-1, scene.corners.shape[2])
     extent = np.ptp(points, axis=0)
     for axis, position in scene.mirrors:  # half of a body, or a quarter
         if np.abs(points[:, axis] - position).min() < 1e-6 * extent[axis]:
             extent[axis] *= 2.0
-    per_length = np.average(1.0 / samples.across[some], weights=samples.area[some])
-    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
-    share = counts / max(float(acting[some].sum()), 1e-300)
-    narrow = scene.gaps.cells[some] < NARROW
-    return BodyCells(
-        scene.bodies[body],
-        across=float(np.sort(extent)[1] * per_length),
-        layer=np.nan,
-        sharp=has_edges(corners),
-        facets=float(1.0 / (edge * per_length)),
-        share=float(share[some[~narrow]].sum()),
-        gaps=tuple(_gaps_of(scene, body, some[narrow], share)),
-    )
+    some = np.flatnonzero(scene.owner[scene.samples.facet] == body)
+    return float(np.sort(extent)[1] * _per_length(scene, some))
 
 
-def _gaps_of(scene: SurfaceScene, body: int, some: NDArray[np.int64], share: Array) -> Iterator[GapCells]:
-    """Gaps in front of some samples, by what is opposite.
+def _per_length(scene: SurfaceScene, some: NDArray[np.int64]) -> float:
+    """Cells per length [1/m] along the normals of some samples, their mean."""
+    return float(np.average(1.0 / scene.samples.across[some], weights=scene.samples.area[some]))
 
-    A force f per area acts in an area of (int f dA)^2 / int f^2 dA, counted in cells: in all of a film where f is
-    uniform, in 2.5 l between a cylinder of radius a and a plane at the distance g, l^2 = 2 a g, where f ~ 1 / gap^2.
-    Planes of symmetry double it.
+
+def _gaps_of(
+    scene: SurfaceScene, some: NDArray[np.int64], narrow: NDArray[np.bool_], share: Array
+) -> Iterator[GapCells]:
+    """Gaps in front of the samples of a body, by what is opposite. Planes of symmetry double what films cover.
+
+    narrow: of these samples.
     """
+    samples, gap, names = scene.samples, scene.gaps.cells, [*scene.bodies, *scene.faces]
+    narrow, some = narrow[np.isfinite(gap[some])], some[np.isfinite(gap[some])]
     partner = scene.gaps.partner[some]
-    of_bodies = scene.owner[scene.samples.facet[np.maximum(partner, 0)]]
+    of_bodies = scene.owner[samples.facet[np.maximum(partner, 0)]]
     opposite = np.where(partner < 0, len(scene.bodies) - 1 - partner, of_bodies)
-    names = [*scene.bodies, *scene.faces]
-    for other in np.unique(opposite).tolist():
-        here = some[opposite == other]
-        weight, cells, covers = share[here], np.maximum(scene.gaps.cells[here], 1e-6), scene.samples.covers[here]
-        total, covered = float(weight.sum()), float(covers.sum())
-        mean = float(cells.min())
-        if total > 0.0:
-            mean, covered = float(np.exp((weight * np.log(cells)).sum() / total)), total**2 / (weight**2 / covers).sum()
-        along = (covered * 2.0 ** _mirrors_at(scene, here)) ** (1.0 / (scene.corners.shape[2] - 1))
-        yield GapCells(scene.bodies[body], names[other], mean, float(cells.min()), float(along), total)
+    for other in np.unique(opposite[narrow]).tolist():
+        facing, here = some[opposite == other], some[(opposite == other) & narrow]
+        weight, cells = share[here], np.maximum(gap[here], 1e-6)
+        total, least = float(weight.sum()), float(cells.min())
+        mean = float(np.exp((weight * np.log(cells)).sum() / total)) if total > 0.0 else least
+        behind = scene.gaps.partner[here]
+        film = np.unique(np.concatenate([here, behind[behind >= 0]]))
+        ends = ends_at_edges(samples.index, samples.normal, film, scene.sharp[scene.owner[samples.facet]])
+        copies = 2.0 ** _mirrors_at(scene, here)
+        if ends:
+            along = float((copies * samples.covers[here].sum()) ** (1.0 / (scene.corners.shape[2] - 1)))
+        else:
+            along = cells_along(gap[facing], copies * samples.covers[facing], samples.normal[facing])
+        body = scene.bodies[scene.owner[samples.facet[here[0]]]]
+        yield GapCells(body, names[other], mean, least, along, ends, total)
 
 
 def _mirrors_at(scene: SurfaceScene, some: NDArray[np.int64]) -> int:
