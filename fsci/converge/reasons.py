@@ -19,9 +19,17 @@ def first_order(case: Case, history: History, summary: Mapping[str, Any]) -> lis
     return [*_backward_euler(case), *_impacts(case, history), *_films(summary)]
 
 
-def indicative(case: Case, history: History, summary: Mapping[str, Any], fixed: Sequence[str] = ()) -> list[str]:
-    """Reasons to trust no band; `fixed` are bodies from mesh files, the facets of whose curved surfaces stay."""
-    return [*_impacts(case, history), *_films(summary), *_start(case), *_files(fixed)]
+def indicative(case: Case, history: History, summary: Mapping[str, Any]) -> list[str]:
+    """Reasons to trust no band of a value that levels change."""
+    return [*_impacts(case, history), *_films(summary), *_start(case)]
+
+
+def unseen(fixed: Sequence[str], unchanged: Sequence[str]) -> list[str]:
+    """Errors that no level shows.
+
+    `fixed` are bodies from mesh files, the facets of whose curved surfaces stay; `unchanged` are words for sources.
+    """
+    return [*_files(fixed), *([f"no level changes the {', '.join(unchanged)}"] if unchanged else ())]
 
 
 def _backward_euler(case: Case) -> Iterator[str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.converge.reasons import first_order, indicative
+from fsci.converge.reasons import first_order, indicative, unseen
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -62,3 +62,11 @@ def test_films():
 
 def test_starts():
     assert "a start: 5 steps" in both("cylinder_2d2", changes=[("time.step", "1.0"), ("time.end", "5.0")])[1]
+
+
+def test_errors_that_no_level_shows():
+    assert unseen([], []) == []
+    assert unseen(["ring (ring.inp)"], ["cells of mesh files", "step"]) == [
+        "the facets of curved surfaces in mesh files are the same on all levels: ring (ring.inp)",
+        "no level changes the cells of mesh files, step",
+    ]
