@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from fsci.converge.estimate import SAFETY, SCATTER
+from fsci.converge.estimate import SCATTER, safety
 from fsci.converge.plan import SECONDS_TO_START
 from fsci.converge.results import BandedValue
 
@@ -76,7 +76,7 @@ def _relative(found: BandedValue, option: Option, factors: Mapping[str, float]) 
     shown = abs(found.twins[option.twin] - told.value) if option.twin in found.twins else 0.0
     shown *= max((factor**order for factor in factors.values()), default=1.0)
     factors = {name: factor / found.size for name, factor in factors.items()}
-    known = {name: SAFETY * error for name, error in told.errors.items() if name in factors}
+    known = {name: safety(told.order) * error for name, error in told.errors.items() if name in factors}
     # what no source alone explains is of the largest of them
     rest = math.sqrt(max(0.0, told.levels_say**2 - sum(error**2 for error in known.values())))
     least = max((gain[name] * factor**order for name, factor in factors.items()), default=1.0)

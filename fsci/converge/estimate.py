@@ -2,14 +2,16 @@
 
 With f_i on level i, whose cells and steps are h_i times those of the finest level, an error C h^p of order p makes
 
-    e = |f_i - f_j| / |h_i^p - h_j^p|
+    e = |f_1 - f_j| / |h_1^p - h_j^p|
 
-the error of the finest level. e is the largest of all pairs of levels, and of the root of the sum of squares of the
+the error of the finest level 1. e is the largest of all other levels j (two coarser ones tell their own error, which
+p = 2 makes too large on the finest one where the order is higher), and of the root of the sum of squares of the
 sources of the error, each changed alone: they may cancel when all change together. With the scatter s of the value on
 grids that are moved, the band is
 
-    b = sqrt((1.3 e)^2 + (2 s)^2).
+    b = sqrt((1.3 e)^2 + (2 s)^2),
 
+or 1.25 e where an order is seen: Roache's factor of three grids (J. Fluids Eng. 116, 1994). 1.3 is of docs/converge.md.
 s is measured on a coarser level and falls with the first power of the size or faster (docs/converge.md). The band is
 at least 1.25 times the change by another element or time scheme, and what the curve of an oscillation changes by within
 the band of its time. p is 2, or less if less is known or seen. Sources and other methods are those of the case itself,
@@ -21,12 +23,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
 from typing import Literal
 
 #: Relative difference that the tolerance of solvers explains.
 SOLVER_DIFFERENCE = 1e-6
-SAFETY, SCATTER, TWIN = 1.3, 2.0, 1.25
+SAFETY, SAFETY_WITH_ORDER, SCATTER, TWIN = 1.3, 1.25, 2.0, 1.25
 #: Orders between which values are taken to follow C h^p.
 LEAST_ORDER, MOST_ORDER = 0.8, 2.6
 #: Order that is assumed of values below that: displacements at the end of a crack have it.
@@ -74,7 +75,8 @@ class Evidence:
     sampling: float = 0.0  #: what may be between the samples of a maximum
     instant: OscillationInstant | None = None
     first_order: Sequence[str] = ()  #: reasons for p = 1
-    indicative: Sequence[str] = ()  #: reasons of the case to trust no band
+    indicative: Sequence[str] = ()  #: reasons of the case to trust no band of a value that levels change
+    unseen: Sequence[str] = ()  #: reasons that no level shows: to trust no band at all
     tolerance: float = BAND  #: relative band that is good enough
 
 
@@ -121,25 +123,32 @@ def estimate(known: Evidence) -> Estimate:
     scatter *= finer / known.shifted
     levels_say = band = None
     if len(usable) > 1 or errors:
-        together = max((finer * _error(a, b, assumed) for a, b in combinations(usable, 2)), default=0.0)
+        together = max((finer * _error(usable[0], other, assumed) for other in usable[1:]), default=0.0)
         apart = math.hypot(*errors.values())
-        levels_say = max(math.hypot(SAFETY * max(together, apart), SCATTER * scatter) + known.sampling, rounding)
+        levels_say = max(math.hypot(safety(order) * max(together, apart), SCATTER * scatter) + known.sampling, rounding)
         if known.instant is not None:
             levels_say = max(levels_say, known.instant.change)
     outside = tuple(name for name, change in twins.items() if levels_say is not None and finer * change > levels_say)
     if levels_say is not None or twins:
         changes = (abs(known.twins[name] - value) if name in outside else finer * twins[name] for name in twins)
         band = max(levels_say or 0.0, TWIN * max(changes, default=0.0))
-    words += tuple(_further_words(known, usable))
+    reasons = [*(() if seen.same else known.indicative), *known.unseen]
+    words += tuple(_further_words(known, usable, reasons))
     verdict: Verdict = "resolved"
     no_phase = known.instant is not None and known.instant.late is None
-    if len(usable) < 3 or known.indicative or seen.assumed == SLOWEST_ORDER or no_phase:
+    wide = band is None or band > known.tolerance * known.scale
+    if len(usable) < 3 or reasons or (seen.assumed == SLOWEST_ORDER and wide) or no_phase:
         verdict = "indicative"
-    if band is None or levels_say is None or (outside and band > known.tolerance * known.scale):
+    if band is None or levels_say is None or (outside and wide):
         verdict = "not resolved"
     elif band >= known.scale > 0.0:
         verdict, words = "not resolved", (*words, "the band is as large as the value")
     return Estimate(value, band, order, verdict, levels_say, errors, scatter, outside, words)
+
+
+def safety(order: float | None) -> float:
+    """The factor of errors, by the order that is seen."""
+    return SAFETY if order is None else SAFETY_WITH_ORDER
 
 
 def _error(a: LevelValue, b: LevelValue, order: float) -> float:
@@ -156,16 +165,16 @@ class _Seen:
 
     words: tuple[str, ...] = ()
     order: float | None = None
-    assumed: float = (
-        2.0  #: order that errors are computed with: a slower one that is seen counts, a faster one does not
-    )
+    #: Order that errors are computed with: a slower one that is seen counts, a faster one does not.
+    assumed: float = 2.0
+    same: bool = False  #: on all of three levels or more
 
 
 def _order(usable: Sequence[LevelValue], rounding: float, scatter: float) -> _Seen:
     """The order of monotone values. Below 2 it counts if no scatter explains it."""
     values = [level.value for level in usable if level.value is not None]
     if len(values) > 1 and max(values) - min(values) <= rounding:
-        return _Seen(("the same on all levels, up to the tolerance of solvers",))
+        return _Seen(("the same on all levels, up to the tolerance of solvers",), same=len(values) > 2)
     if len(values) < 3:
         return _Seen()
     near, far = values[1] - values[0], values[2] - values[1]
@@ -208,7 +217,7 @@ def _deviation(values: Sequence[float]) -> float:
     return math.sqrt(math.fsum((value - mean) ** 2 for value in some) / (len(some) - 1))
 
 
-def _further_words(known: Evidence, usable: Sequence[LevelValue]) -> Iterator[str]:
+def _further_words(known: Evidence, usable: Sequence[LevelValue], indicative: Sequence[str]) -> Iterator[str]:
     for level in known.levels:
         if level.value is None:
             yield f"level x{level.size:.3g} has no result: {level.message}"
@@ -225,11 +234,11 @@ def _further_words(known: Evidence, usable: Sequence[LevelValue]) -> Iterator[st
         yield f"its steps sample the curve: up to {known.sampling:.2g} of it is between them"
     if known.instant is not None:
         yield _at_an_instant(known.instant)
-    both = [reason for reason in known.first_order if reason in known.indicative]
+    both = [reason for reason in known.first_order if reason in indicative]
     for words, reasons in (
         ("first order is assumed", [reason for reason in known.first_order if reason not in both]),
         ("indicative, first order is assumed", both),
-        ("indicative", [reason for reason in known.indicative if reason not in both]),
+        ("indicative", [reason for reason in indicative if reason not in both]),
     ):
         if reasons:
             yield f"{words}: {', '.join(reasons)}"

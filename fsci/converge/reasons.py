@@ -8,25 +8,56 @@ from typing import Any
 import numpy as np
 
 from fsci.case import Case
+from fsci.meshes.curved import outward_edges
+from fsci.meshes.of_case import read_body, read_rigid_body
 from fsci.running.history import History
 
 #: Steps until a flow or a body that starts at once has forgotten how; all that moves in `cases/` has as many or more.
 STEPS_TO_FORGET = 10
+#: Distance from the boundary of the box, over its size, up to which an edge is on it: mesh files have seven digits.
+ON_THE_BOX = 1e-6
 
 
 def first_order(case: Case, history: History, summary: Mapping[str, Any]) -> list[str]:
     """Reasons for errors of first order."""
-    return [*_backward_euler(case), *_impacts(case, history), *_films(summary)]
+    return [*_backward_euler(case), *_corners(case), *_impacts(case, history), *_films(summary)]
 
 
-def indicative(case: Case, history: History, summary: Mapping[str, Any], fixed: Sequence[str] = ()) -> list[str]:
-    """Reasons to trust no band; `fixed` are bodies from mesh files, the facets of whose curved surfaces stay."""
-    return [*_impacts(case, history), *_films(summary), *_start(case), *_files(fixed)]
+def indicative(case: Case, history: History, summary: Mapping[str, Any]) -> list[str]:
+    """Reasons to trust no band of a value that levels change."""
+    return [*_impacts(case, history), *_films(summary), *_start(case)]
+
+
+def unseen(fixed: Sequence[str], unchanged: Sequence[str]) -> list[str]:
+    """Errors that no level shows.
+
+    `fixed` are bodies from mesh files, the facets of whose curved surfaces stay; `unchanged` are words for sources.
+    """
+    return [*_files(fixed), *([f"no level changes the {', '.join(unchanged)}"] if unchanged else ())]
 
 
 def _backward_euler(case: Case) -> Iterator[str]:
     if case.fluid is not None and case.fluid.scheme == "backward_euler":
         yield "the scheme is backward_euler"
+
+
+def _corners(case: Case) -> Iterator[str]:
+    """Edges of bodies that stick out into the flow.
+
+    Around one of 90 degrees velocities are r^0.54 and stresses r^-0.46 (Moffatt, J. Fluid Mech. 18, 1964): forces and
+    the flow elsewhere have errors of order 2 x 0.54, in all elements.
+    """
+    if case.fluid is None:
+        return
+    low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+    inside = ON_THE_BOX * (high - low)
+    wetted = {} if case.coupling is None else case.coupling.wetted
+    meshes = {name: (read_rigid_body(case, name)[0], body.on) for name, body in case.rigid_surfaces.items()}
+    meshes |= {name: (read_body(case, name), wetted.get(name)) for name in case.elastic_bodies}
+    for name, (mesh, surfaces) in meshes.items():
+        edges = outward_edges(mesh, surfaces)
+        if ((edges > low + inside) & (edges < high - inside)).all(axis=1).any():
+            yield f"'{name}' has sharp edges in the flow"
 
 
 def _impacts(case: Case, history: History) -> Iterator[str]:

@@ -11,7 +11,7 @@ from fsci.case import Case
 from fsci.converge.estimate import BAND, Estimate, Evidence, LevelValue, OscillationInstant, estimate
 from fsci.converge.oscillation import oscillation
 from fsci.converge.plan import Plan, PlannedRun
-from fsci.converge.reasons import first_order, indicative
+from fsci.converge.reasons import first_order, indicative, unseen
 from fsci.converge.values import Distance, Observed, chosen, distance, observed
 from fsci.twin.runs import TwinEnded
 
@@ -60,17 +60,21 @@ def findings(plan: Plan, runs: Sequence[Done], only: Sequence[str], tolerance: f
     base = next((one for one in runs if one.run.name == "case"), None)
     if base is None or base.ended.message:
         return {}
-    unchanged = plan.unchanged([one.run for one in runs])
-    reasons = indicative(plan.case, base.ended.history, base.ended.summary, plan.fixed)
-    reasons += [f"no level changes the {', '.join(unchanged)}"] * bool(unchanged)
-    slow = first_order(plan.case, base.ended.history, base.ended.summary)
+    ended = (plan.case, base.ended.history, base.ended.summary)
+    known = Evidence(
+        (),
+        0.0,
+        first_order=first_order(*ended),
+        indicative=indicative(*ended),
+        unseen=unseen(plan.fixed, plan.unchanged([one.run for one in runs])),
+        tolerance=tolerance,
+    )
     names = list(dict.fromkeys(name for one in runs if one.run.role == "level" for name in one.values))
-    return {name: _finding(name, runs, slow, reasons, tolerance) for name in chosen(names, only)}
+    return {name: _finding(name, runs, known) for name in chosen(names, only)}
 
 
-def _finding(
-    name: str, runs: Sequence[Done], slow: Sequence[str], reasons: Sequence[str], tolerance: float
-) -> BandedValue:
+def _finding(name: str, runs: Sequence[Done], of_case: Evidence) -> BandedValue:
+    """A value with its band; `of_case` has what is known of all values."""
     levels = sorted((one for one in runs if one.run.role == "level"), key=lambda one: one.run.size)
     # a finer level that fails does not take the value of the case
     while levels[0].run.size < 1.0 and levels[0].ended.message:
@@ -80,9 +84,10 @@ def _finding(
     known = replace(
         _evidence(runs, levels, lambda one: _value(one, name), scale),
         sampling=0.0 if finest is None else finest.sampling,
-        first_order=slow,
-        indicative=reasons,
-        tolerance=tolerance,
+        first_order=of_case.first_order,
+        indicative=of_case.indicative,
+        unseen=of_case.unseen,
+        tolerance=of_case.tolerance,
     )
     told = estimate(known)
     instant = _instant(name, runs, levels, known, told)

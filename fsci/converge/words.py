@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from fsci.converge.estimate import SOLVER_DIFFERENCE
 from fsci.converge.results import BandedValue, Done
 from fsci.twin.grids import Settings
 
@@ -40,9 +41,10 @@ def sentences(name: str, found: BandedValue, runs: Sequence[Done]) -> Iterator[s
 
 def _largest(found: BandedValue) -> str:
     """The source with the largest share, and the scatter."""
-    shares = found.estimate.shares
+    shares, band = found.estimate.shares, found.estimate.band
     parts = []
-    if any(shares.values()):
+    # of a band that is the tolerance of solvers, the shares are those of rounding errors
+    if any(shares.values()) and band is not None and band > SOLVER_DIFFERENCE * found.scale:
         name = max(shares, key=lambda one: shares[one])
         parts.append(f"largest: {name} {100.0 * shares[name]:.0f} %")
     if found.estimate.scatter and found.scale:
@@ -54,7 +56,7 @@ def _twin(name: str, words: str, value: float, found: BandedValue) -> str:
     told = found.estimate
     assert told.value is not None
     if name not in told.outside:
-        return f"{words}: {value:.6g}, inside"
+        return f"{words}: {0.0 if abs(value) < SOLVER_DIFFERENCE * found.scale else value:.6g}, inside"
     say = "levels" if told.levels_say is None or not found.scale else percent(told.levels_say / found.scale)
     change = f" ({100.0 * (value - told.value) / found.scale:+.2g} %)" if found.scale else ""
     verdict = "NOT RESOLVED: " if told.verdict == "not resolved" else ""
@@ -90,8 +92,11 @@ def run_row(one: Done) -> str:
 
 
 def percent(share: float) -> str:
-    """Two digits; what solvers decide is not shown in digits."""
-    return f"{100.0 * share:.2g} %" if math.isfinite(share) else "unknown"
+    """Two digits, without an exponent up to a million; what solvers decide is not shown in digits."""
+    if not math.isfinite(share):
+        return "unknown"
+    digits = f"{100.0 * share:.2g}"
+    return f"{float(digits):.0f} %" if 100.0 <= float(digits) < 1e6 else f"{digits} %"
 
 
 def _with_band(value: float, band: float) -> str:
@@ -101,7 +106,7 @@ def _with_band(value: float, band: float) -> str:
     place = 1 - math.floor(math.log10(band))
     if not -3 <= place <= 6 or abs(value) >= 1e6:
         digits = max(2, math.floor(math.log10(max(abs(value), band))) + 1 + place)
-        return f"{value:.{min(digits, 12)}g} +- {band:.2g}"
+        return f"{round(value, place):z.{min(digits, 12)}g} +- {band:.2g}"
     return f"{value:z.{max(place, 0)}f} +- {band:.{max(place, 0)}f}"
 
 

@@ -1,4 +1,4 @@
-"""Whether the facets of a mesh stand for a curved surface."""
+"""Where the facets of a mesh stand for a curved surface, and where they meet in an edge."""
 
 from __future__ import annotations
 
@@ -28,6 +28,22 @@ def is_curved(mesh: Mesh, names: Sequence[str] | None = None) -> bool:
     sides = np.sort(np.stack([planes[first[bent]], planes[second[bent]]], axis=1), axis=1)
     sides = np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0)
     return bool((np.bincount(sides.ravel(), minlength=1) > 1).any())
+
+
+def outward_edges(mesh: Mesh, names: Sequence[str] | None = None) -> NDArray[np.float64]:
+    """Centres [m] of edges, in 2D of corners, that stick out of the body, shape (n, dim), of named surfaces or all.
+
+    Around them is more than a half space of fluid, at most 360 degrees less the 120 of a hexagon.
+    """
+    simplices, nodes = tessellate(mesh, names)
+    corners = mesh.points[nodes][simplices]
+    normals, centres = unit_normals(corners), corners.mean(axis=1)
+    first, second = _neighbours(simplices)
+    sharp = (normals[first] * normals[second]).sum(axis=1) <= np.cos(EDGE) + 1e-9
+    outward = ((centres[second] - centres[first]) * normals[first]).sum(axis=1) < 0.0
+    pairs = np.stack([first, second], axis=1)[sharp & outward]
+    found = [corners[a][np.isin(simplices[a], simplices[b])].mean(axis=0) for a, b in pairs]
+    return np.array(found).reshape(-1, mesh.points.shape[1])
 
 
 def _neighbours(simplices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -49,7 +49,7 @@ def run_twins(
     chosen = _chosen(twins(case), only, quickly)
     out.mkdir(parents=True, exist_ok=True)
     known = known_runs(out / TWIN_RESULTS)
-    say(f"{case.path}: {len(chosen)} twins in {out}")
+    say(f"{case.path}: {len(chosen)} {'twin' if len(chosen) == 1 else 'twins'} in {out}")
     ended: dict[str, TwinEnded] = {}
     runs = [BASE, *(replace(twin, settings=(*twin.settings, *NO_FIELDS)) for twin in chosen)]
     with WarmProcess() as warm:

@@ -26,7 +26,7 @@ def test_monotone_values(order, sizes):
     assert found.order == pytest.approx(order, abs=1e-6)
     error = 0.01 * sizes[0] ** order
     assert error <= found.band
-    assert order > 2.0 or found.band <= 1.31 * error
+    assert order > 2.0 or found.band == pytest.approx(1.25 * error)  # Roache's factor of three grids with an order
     assert found.verdict == "resolved"
 
 
@@ -50,10 +50,19 @@ def test_faster_than_second_order_is_no_order(order):
 @pytest.mark.parametrize("order", [0.5, 0.6, 0.7])
 def test_slower_than_first_order(order):
     """About the square root of the size: second order would say a fifth of the error."""
-    found = estimate(evidence(levels(order)))
+    found = estimate(evidence(levels(order), tolerance=0.001))
     assert found.order is None
     assert found.verdict == "indicative"
     assert 0.01 < found.band
+    assert "finer levels change it hardly less than coarser ones: its order is below 0.8" in found.words
+
+
+@pytest.mark.parametrize(("tolerance", "verdict"), [(0.0043, "indicative"), (0.0045, "resolved")])
+def test_a_slow_order_within_the_tolerance(tolerance, verdict):
+    """The band of the slowest order, 1.3 times the error 0.01 of 3.01, is enough where it is smaller than asked for."""
+    found = estimate(evidence(levels(0.5), tolerance=tolerance))
+    assert found.band == pytest.approx(0.013)
+    assert found.verdict == verdict
     assert "finer levels change it hardly less than coarser ones: its order is below 0.8" in found.words
 
 
@@ -61,7 +70,7 @@ def test_slower_than_first_order(order):
 def test_scatter_that_explains_a_slow_order(scatter, order):
     """Where the place of cells moves values by as much as the level does, no slow order is seen."""
     shifts = (EXACT - scatter, EXACT, EXACT + scatter)
-    found = estimate(evidence(levels(0.6), shifts=shifts))
+    found = estimate(evidence(levels(0.6), shifts=shifts, tolerance=0.001))
     first, second, third = (level.value for level in levels(0.6))
     pairs = ((second - first) / (2 ** (order / 2) - 1), (third - first) / (2**order - 1))
     assert found.band == pytest.approx(math.hypot(1.3 * max(pairs), 2.0 * scatter), rel=0.02)
@@ -72,9 +81,17 @@ def test_alternating_values():
     values = [3.01, 2.98, 3.05]
     found = estimate(evidence([LevelValue(size, value) for size, value in zip(SIZES, values, strict=True)]))
     assert found.order is None
-    assert found.band == pytest.approx(1.3 * 0.07 / 2.0)  # between the levels 2 and 3: 0.07 / (4 - 2)
+    assert found.band == pytest.approx(1.3 * 0.03)  # of levels 1 and 2: 0.03 / (2 - 1), of 1 and 3: 0.04 / (4 - 1)
     assert "it goes up and down between levels: no order" in found.words
     assert found.verdict == "resolved"
+
+
+def test_coarser_levels_do_not_say_more_than_the_finest_one():
+    """Of an error C h^4, a pair with the finest level says at most 5 C at p = 2, that of both others 6 C."""
+    assert estimate(evidence(levels(4.0))).band == pytest.approx(1.3 * 5.0 * 0.01)
+    # two levels that agree by chance do not hide the third one
+    found = estimate(evidence([LevelValue(1.0, 3.0), LevelValue(2**0.5, 3.0), LevelValue(2.0, 3.3)]))
+    assert found.band == pytest.approx(1.3 * 0.1)
 
 
 def test_first_order_methods():
@@ -177,7 +194,7 @@ def test_twin_inside():
 def test_false_convergence():
     """Three levels agree on a wrong value; the other element says so."""
     found = estimate(evidence(levels(coefficient=0.001), twins={"element": 2.7, "scheme": 3.001}))
-    assert found.levels_say == pytest.approx(0.0013, rel=1e-3)
+    assert found.levels_say == pytest.approx(0.00125, rel=1e-3)
     assert found.band == pytest.approx(1.25 * 0.301)
     assert found.outside == ("element",)
     assert found.verdict == "not resolved"
@@ -210,6 +227,18 @@ def test_reasons_of_the_case():
     assert "indicative: an impact" in found.words
 
 
+def test_a_value_that_no_level_changes():
+    """An impact does not change it; facets that are the same on all levels may. Two levels agree by chance."""
+    same = [LevelValue(size, EXACT) for size in SIZES]
+    found = estimate(evidence(same, first_order=("an impact",), indicative=("an impact",)))
+    assert found.verdict == "resolved"
+    assert not any(words.startswith("indicative") for words in found.words)
+    found = estimate(evidence(same, indicative=("an impact",), unseen=("the facets",)))
+    assert found.verdict == "indicative"
+    assert found.words[-1] == "indicative: the facets"
+    assert estimate(evidence(same[:2], indicative=("an impact",))).verdict == "indicative"
+
+
 def test_one_reason_for_both():
     found = estimate(evidence(levels(), first_order=("an impact", "the scheme"), indicative=("an impact", "a start")))
     assert found.words == (
@@ -221,5 +250,5 @@ def test_one_reason_for_both():
 
 def test_sampling_of_a_maximum():
     found = estimate(evidence(levels(), sampling=0.5))
-    assert found.band == pytest.approx(1.3 * 0.01 + 0.5)
+    assert found.band == pytest.approx(1.25 * 0.01 + 0.5)
     assert "its steps sample the curve: up to 0.5 of it is between them" in found.words

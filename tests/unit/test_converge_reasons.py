@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.converge.reasons import first_order, indicative
+from fsci.converge.reasons import first_order, indicative, unseen
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -24,7 +24,8 @@ def test_none():
 
 
 def test_backward_euler():
-    assert both("hydrostatic_contact") == (["the scheme is backward_euler"], [])
+    slow = ["the scheme is backward_euler", "'block' has sharp edges in the flow"]
+    assert both("hydrostatic_contact") == (slow, [])
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,35 @@ def test_impacts_of_rigid_bodies(tmp_path):
     assert first_order(case, history, {}) == indicative(case, history, {}) == ["an impact"]
 
 
+FLOW = """
+time: {step: 0.1, end: 2}
+fluid:
+  density: 1
+  viscosity: 1
+  grid: {from: [0, 0], to: [4, 2], cells: [32, 16]}
+  patches: {inlet: {on: x-, velocity: [1, 0]}, outlet: {on: x+, outflow: true}, walls: {on: [y-, y+], no_slip: true}}
+  bodies: {post: {mesh: MESH}}
+probes: {drag: {body: post, quantity: force}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("mesh", "sharp"),
+    [
+        ("{shape: rectangle, size: [0.5, 0.6], cells: [1, 1], origin: [1, 0.7]}", True),
+        ("{shape: rectangle, size: [0.5, 0.6], cells: [3, 2], origin: [1, -0.1]}", True),  # two of four corners
+        ("{shape: rectangle, size: [0.5, 2.2], cells: [1, 1], origin: [3.8, -0.1]}", False),  # none
+        ("{shape: rectangle, size: [0.5, 2], cells: [1, 1], origin: [1, 0]}", False),  # on the walls
+        ("{shape: disc, radius: 0.3, cells: [12, 1], translate: [1, 1]}", False),
+    ],
+)
+def test_sharp_edges_in_the_flow(tmp_path, mesh, sharp):
+    (tmp_path / "case.yaml").write_text(FLOW.replace("MESH", mesh))
+    case = load_case(tmp_path)
+    assert first_order(case, {}, {}) == ["'post' has sharp edges in the flow"] * sharp
+    assert indicative(case, {}, {}) == []
+
+
 def film(body, to, cells, warns=True):
     return {"body": body, "to": to, "cells": cells, "warns": warns}
 
@@ -62,3 +92,11 @@ def test_films():
 
 def test_starts():
     assert "a start: 5 steps" in both("cylinder_2d2", changes=[("time.step", "1.0"), ("time.end", "5.0")])[1]
+
+
+def test_errors_that_no_level_shows():
+    assert unseen([], []) == []
+    assert unseen(["ring (ring.inp)"], ["cells of mesh files", "step"]) == [
+        "the facets of curved surfaces in mesh files are the same on all levels: ring (ring.inp)",
+        "no level changes the cells of mesh files, step",
+    ]

@@ -10,7 +10,7 @@ from fsci.converge.page import write_page
 from fsci.converge.plan import PlannedRun
 from fsci.converge.results import BandedValue, Done
 from fsci.converge.values import Distance, Observed
-from fsci.converge.words import helps, run_row, seconds_in_words, sentences, settings, without_results
+from fsci.converge.words import helps, percent, run_row, seconds_in_words, sentences, settings, without_results
 from fsci.twin.changes import Twin
 from fsci.twin.runs import TwinEnded
 
@@ -42,6 +42,24 @@ def test_a_resolved_value():
         list(sentences("drag", found, [done()]))[2]
         == "  over time, to the next level: 0.9 % at most, 0.18 % in the mean"
     )
+
+
+def test_a_value_that_is_zero():
+    """Rounding errors have neither digits nor shares."""
+    zero = Estimate(2.2e-18, 2e-7, None, "resolved", levels_say=2e-7, errors={"step": 1e-18, "cells": 3e-18})
+    assert list(sentences("still", BandedValue(zero, 0.2, {"element": -4.6e-33}), [done()])) == [
+        "still 0 +- 2e-07 (0.0001 %)",
+        "  element q2q1: 0, inside",
+    ]
+    assert next(sentences("still", BandedValue(replace(zero, value=-1e-34), 0.2), [])).startswith("still 0 +- 2e-07")
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.0946, "9.5 %"), (0.994, "99 %"), (0.996, "100 %"), (6.63, "660 %"), (2.7e12, "2.7e+14 %"), (1e-8, "1e-06 %")],
+)
+def test_percent(share, words):
+    assert percent(share) == words
 
 
 def test_false_convergence():

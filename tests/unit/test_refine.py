@@ -8,7 +8,7 @@ import pytest
 from cell_geometry import smallest_determinant, volume
 
 from fsci import shapes
-from fsci.meshes.curved import is_curved
+from fsci.meshes.curved import is_curved, outward_edges
 from fsci.meshes.mesh import MeshError, build_mesh
 from fsci.meshes.refine import refined
 from solvers.mesh.cell_types import CELL_TYPES
@@ -124,6 +124,25 @@ def test_a_blunt_corner_is_no_curve(count):
     x, y = mesh.points.T
     mesh.points[:] = np.stack([48.0 * x, 44.0 * y * (1.0 - x) + (44.0 + 16.0 * y) * x], axis=1)
     assert not is_curved(mesh)
+
+
+def test_outward_edges():
+    """Not those inwards, and not those of facets that stand for a circle."""
+    box = outward_edges(shapes.box(size=(2.0, 1.0, 1.0), cells=(2, 1, 1)))
+    assert len(box) == 16  # two for each edge along x
+    assert ((np.isclose(box, 0.0) | np.isclose(box, [2.0, 1.0, 1.0])).sum(axis=1) == 2).all()
+    corners = outward_edges(shapes.rectangle(size=(3.0, 1.0), cells=(3, 2)))
+    assert {tuple(point) for point in corners} == {(0.0, 0.0), (3.0, 0.0), (0.0, 1.0), (3.0, 1.0)}
+    ring = shapes.ring(**RING, cells=(12, 2), angle=90.0)
+    assert len(outward_edges(ring)) == 4
+    assert len(outward_edges(ring, ["inner", "outer"])) == 0
+    # an angle bracket: five of its six corners stick out
+    bracket = Mesh(
+        np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2], [0, 1], [1, 0]], dtype=float),
+        np.array([[0, 7, 3, 6], [7, 1, 2, 3], [6, 3, 4, 5]]),
+        "quad",
+    )
+    assert sorted(map(tuple, outward_edges(bracket))) == [(0.0, 0.0), (0.0, 2.0), (1.0, 2.0), (2.0, 0.0), (2.0, 1.0)]
 
 
 def test_curved_surfaces_of_those_that_count():
