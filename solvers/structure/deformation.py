@@ -61,9 +61,13 @@ class LimitPoint:
             self._speeds.append(speed)
         self._reached = t
 
+    def growth(self) -> float:
+        """Speed of the last step relative to the usual one before; 1 where too few steps show what is usual."""
+        return self._speeds[-1] / median(self._speeds[:-1]) if len(self._speeds) > USUAL else 1.0
+
     def explain(self) -> str:
         """What a step that fails now most likely means, to be added to the reason; empty if nothing points to it."""
-        if len(self._speeds) <= USUAL or self._speeds[-1] < RUNAWAY * median(self._speeds[:-1]):
+        if self.growth() < RUNAWAY:
             return ""
         return (
             f"; most likely there is no equilibrium beyond t = {self._reached:.4g}: displacements grew ever faster "
