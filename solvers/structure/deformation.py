@@ -32,7 +32,10 @@ def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
     """A reason to reject displacements u [m], None if there is none; extent: size of the bodies [m] (collective)."""
     farthest = comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
     if farthest > FLOWN_OFF * extent:
-        return f"a displacement of {farthest:.3g} is far larger than the body, {extent:.3g}: is a body not supported?"
+        return (
+            f"a displacement of {farthest:.3g} is far larger than the body, {extent:.3g}: is a body not supported? "
+            "One that is free until it touches needs weak 'springs', a pair with 'adjust', or 'dynamics'"
+        )
     return None
 
 
