@@ -28,7 +28,10 @@ OF_KIND: dict[FailureKind, tuple[str, ...]] = {
     ),
     FailureKind.SUCTION: ("contact.film.zone=wetted", PARTING),
     FailureKind.LIMIT_POINT: ("structure.dynamics: past a limit point a structure snaps, and has inertia",),
-    FailureKind.UNSUPPORTED: ("supports or weak springs: a static body without them has no unique solution",),
+    FailureKind.UNSUPPORTED: (
+        "supports or weak springs: a static body without them has no unique solution",
+        "contact.pairs.NAME.adjust=GAP, or dynamics, where a body is free until it touches",
+    ),
     FailureKind.INVERTED: (
         f"{SHORTER}: the load or the motion of a step is too large for the elements",
         "a finer mesh, or rounder corners, where the element is",

@@ -99,6 +99,7 @@ class Rims:
             + _each(dD, ((D > self._areas) - weight)[:, None] * n)
         )
         size = np.linalg.norm(values, axis=1)
+        turned &= size > 0.0  # iterates that fold facets leave no direction
         unit = np.where(turned[:, None], values / np.where(turned, size, 1.0)[:, None], n)
         turn = along(unit) * np.divide(1.0, size, out=np.zeros(C), where=turned)[:, None, None]
         others = dn.scaled_rows((~turned).repeat(dim).astype(float))

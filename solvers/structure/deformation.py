@@ -32,7 +32,10 @@ def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
     """A reason to reject displacements u [m], None if there is none; extent: size of the bodies [m] (collective)."""
     farthest = comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
     if farthest > FLOWN_OFF * extent:
-        return f"a displacement of {farthest:.3g} is far larger than the body, {extent:.3g}: is a body not supported?"
+        return (
+            f"a displacement of {farthest:.3g} is far larger than the body, {extent:.3g}: is a body not supported? "
+            "One that is free until it touches needs weak 'springs', a pair with 'adjust', or 'dynamics'"
+        )
     return None
 
 
@@ -61,9 +64,13 @@ class LimitPoint:
             self._speeds.append(speed)
         self._reached = t
 
+    def growth(self) -> float:
+        """Speed of the last step relative to the usual one before; 1 where too few steps show what is usual."""
+        return self._speeds[-1] / median(self._speeds[:-1]) if len(self._speeds) > USUAL else 1.0
+
     def explain(self) -> str:
         """What a step that fails now most likely means, to be added to the reason; empty if nothing points to it."""
-        if len(self._speeds) <= USUAL or self._speeds[-1] < RUNAWAY * median(self._speeds[:-1]):
+        if self.growth() < RUNAWAY:
             return ""
         return (
             f"; most likely there is no equilibrium beyond t = {self._reached:.4g}: displacements grew ever faster "

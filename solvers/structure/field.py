@@ -72,8 +72,9 @@ class Structure:
         self.extrapolation = np.zeros(self.layout.size)  #: of the velocities of massless dofs in this step
         self.energy = EnergyBalance()
         self._limit_point = LimitPoint()
+        loses = time.dissipates or contact is not None
         self.energy_sentinel = EnergySentinel(
-            self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
+            self.energy, self._limit_point, dissipates=loses, contact=contact is not None
         )
         self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
         self._unbalanced = self.residual_force  #: the residual at free dofs [N]

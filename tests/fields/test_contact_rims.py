@@ -100,6 +100,28 @@ def test_directions_have_exact_derivatives(dim, beyond):
     assert np.linalg.norm(now.normals[own.multipliers] - averaged, axis=1).max() > 0.01
 
 
+def test_a_node_between_folded_facets_has_no_direction():
+    """An iterate folds a facet onto the next one: normals cancel between them, and the rims are not covered."""
+    bodies = [make_body("lower", shapes.rectangle([1.0, 1.0], [2, 2]))]
+    bodies.append(make_body("upper", shapes.rectangle([0.75, 0.5], [3, 2], [0.125, 0.9375])))
+    structure, contact = make_contact(bodies, [(("upper", "bottom"), ("lower", "top"))])
+    structure.initialise(0.0, 1.0)
+    u = np.zeros(contact.nodes.points.shape)
+    contact.evaluate(u, 0.0)
+    contact.begin_step()
+    own = contact.multipliers.patches[0]
+    nodes = own.nodes
+    first, left, right, last = nodes[np.argsort(contact.nodes.points[nodes, 0])]
+    u[first] = contact.nodes.points[right] - contact.nodes.points[first]
+    u[last] = -0.25, 0.25  # upright, with nothing opposite
+    with np.errstate(divide="raise", invalid="raise"):
+        contact.evaluate(u, 0.0)
+    (folded,) = own.multipliers[nodes == left]
+    assert contact.terms.D[folded] > 0.0
+    assert not contact.terms.normals[folded].any()
+    assert np.isfinite(contact.terms.dnormals.data).all()
+
+
 def test_a_plane_of_symmetry_cuts_no_rim():
     """Half of a block: at its middle only the other end of the surface is a rim."""
     held = [Symmetry("left")]

@@ -7,6 +7,7 @@ from programs import fsci, warnings_of
 
 from coupling.balance import InterfaceSentinel
 from fsci.running.history import read_history
+from solvers.structure.deformation import LimitPoint
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 
 
@@ -20,7 +21,7 @@ def balance(steps, start=1.0):
 
 
 def kinds(energy, *, dissipates=False):
-    return [finding.kind for finding in EnergySentinel(energy, dissipates=dissipates).look(0.0, 0.1)]
+    return [finding.kind for finding in EnergySentinel(energy, LimitPoint(), dissipates=dissipates).look(0.0, 0.1)]
 
 
 def test_energy_from_nothing():
@@ -28,7 +29,7 @@ def test_energy_from_nothing():
     assert kinds(balance(impact)) == []  # what the last step exchanges is not known better
     flight = [*impact, (0.0, 2.0, 0.0)]
     assert kinds(balance(flight)) == kinds(balance(flight), dissipates=True) == ["energy"]
-    (found,) = EnergySentinel(balance(flight), dissipates=True).look(0.0, 0.1)
+    (found,) = EnergySentinel(balance(flight), LimitPoint(), dissipates=True).look(0.0, 0.1)
     assert found.value == pytest.approx(1.0)
     assert "has grown without external work, by 1 [energy]" in found.message
     assert kinds(balance([(0.0, 0.2, 0.8), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)])) == []
