@@ -25,7 +25,10 @@ fluid:
 coupling: {}
 contact: {friction: {coefficient: 0.3}}
 solver: {newton: {residual: 1.0e-12}}
-probes: {one: {body: one, quantity: centre}, two: {body: two, quantity: centre}, spin: {body: two, quantity: angular_momentum}}
+probes:
+  one: {body: one, quantity: centre}
+  two: {body: two, quantity: centre}
+  spin: {body: two, quantity: angular_momentum}
 output: {fields_every: 0}
 """  # noqa: E501
 DRY = """\
@@ -38,7 +41,10 @@ rigid:
 contact:
   friction: {coefficient: 0.3}
   obstacles: {floor: {mesh: {shape: box, size: [2, 2, 0.2], cells: [1, 1, 1], origin: [-1, -1, -0.2]}, on: top}}
-probes: {one: {body: one, quantity: centre}, two: {body: two, quantity: centre}, spin: {body: two, quantity: angular_momentum}}
+probes:
+  one: {body: one, quantity: centre}
+  two: {body: two, quantity: centre}
+  spin: {body: two, quantity: angular_momentum}
 output: {fields_every: 0}
 """
 

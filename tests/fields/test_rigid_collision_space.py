@@ -1,4 +1,4 @@
-"""Two free rigid bodies collide obliquely in space, with friction: momentum, moments of momentum, Newton and Coulomb."""
+"""Two free rigid bodies collide obliquely in space, with friction: momentum, spins, Newton's and Coulomb's laws."""
 
 from __future__ import annotations
 

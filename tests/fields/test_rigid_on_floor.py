@@ -24,7 +24,7 @@ probes:
   centre: {body: body, quantity: centre}
   momentum: {body: body, quantity: momentum}
 output: {fields_every: 0}
-"""  # noqa: E501
+"""
 DISC = (
     BALL.replace("[0, 0, -10]", "[0, -10]")
     .replace("shape: sphere, radius: 0.15, cells: [3, 1], translate: [0.31, 0.28, 0.153]",
