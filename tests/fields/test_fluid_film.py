@@ -93,6 +93,19 @@ def test_a_film_goes_on_into_corners_of_cells(angle):
     assert films(64, 1.6) == [44]
 
 
+@pytest.mark.parametrize("sides", [16, 20, 24, 48])
+def test_a_film_between_polygons_does_not_depend_on_rounding(sides):
+    """Facets that lie in one plane of a film by the direction of their normals, however little the discs are turned."""
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    films = []
+    for turn in (-1e-12, 0.0, 1e-12):
+        ring = np.stack([np.cos(angles + turn), np.sin(angles + turn)], axis=1)
+        discs = [body(name, [x, 0.513] + 0.2 * ring, loop(sides)) for name, x in (("a", 0.28), ("b", 0.72))]
+        films.append(scene(*discs).cut.film)
+    assert films[1].min() < 1e-3
+    np.testing.assert_allclose([films[0], films[2]], [films[1]] * 2, rtol=1e-9)
+
+
 def test_no_film():
     """Not across the solid of a thin body, not where walls are a cell apart, not with first order."""
     assert scene(plate("thin", 0.43, 0.46)).cut.film is None

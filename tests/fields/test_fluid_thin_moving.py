@@ -11,7 +11,7 @@ from fsci.case.plausible_flow import CELLS_ACROSS_IN_CONTACT
 from fsci.running.history import read_history
 from solvers.api import StepFailed
 from solvers.fluid.flow.sheet_transfer import along_surface, sides_of, transfer
-from solvers.fluid.flow.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin
+from solvers.fluid.flow.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin, solid_of
 from solvers.fluid.geometry.pieces import off_boundary
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform
@@ -232,6 +232,30 @@ def test_which_bodies_are_looked_at(size, thin, thick):
     size = np.maximum(size, [np.floor(10.0 * thick) / 10.0 + size[0], 0.0])
     plate, facets = block([10.3, 10.3], 10.3 + size)
     assert may_be_thin(uniform([0, 0], [70, 70], [70, 70]), facets, plate, thick) == thin
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01, 0.4])
+def test_thick_bodies_side_by_side_are_not_thin(gap):
+    """Between them is no solid; a plate beside them is thin, so is the wall of a ring, and halves that are tied."""
+    grid, angles = uniform([0, 0], [70, 70], [70, 70]), 2.0 * np.pi * np.arange(48) / 48
+    circle, ring = (
+        np.stack([np.cos(angles), np.sin(angles)], axis=1),
+        np.stack([np.arange(48), np.arange(1, 49) % 48], 1),
+    )
+    two = np.concatenate([[20.3, 20.4] + 8.0 * circle, [36.3 + gap, 20.6] + 8.0 * circle])
+    plate, sides = block([20.0, 40.0], [30.0, 40.5])
+    inner = [20.3, 20.4] + 7.0 * circle
+
+    def thin(*surfaces, tied=None):
+        counts = np.cumsum([0, *(len(x) for x, _ in surfaces)])
+        facets = np.concatenate([own + first for (_, own), first in zip(surfaces, counts, strict=False)])
+        x = np.concatenate([x for x, _ in surfaces])
+        return may_be_thin(grid, facets, x, 3.05, solid_of(facets, x, tied))
+
+    assert not thin((two[:48], ring), (two[48:], ring))
+    assert thin((two[:48], ring), (two[48:], ring), (plate, sides))
+    assert thin((two[:48], ring), (inner, ring[:, ::-1]))
+    assert thin((two[:48], ring), (two[48:], ring), tied=np.arange(96) % 48 == 0)
 
 
 @pytest.mark.parametrize("radius", [1.5, 2.0, 4.0])

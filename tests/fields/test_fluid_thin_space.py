@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady, sphere, step, values
 from programs import fsci
+from scipy.spatial import ConvexHull
 from thin_space import duct, sealing, turn
 
 from fsci.running.history import read_history
@@ -226,3 +227,18 @@ def test_two_processes(tmp_path, element):
         found.append([history[name][-1] for name in ("force.x", "force.y", "front", "back", "fluid.mass")])
     assert np.allclose(found[1], found[0], rtol=1e-8, atol=1e-10)
     assert found[0][2] > found[0][3] + 0.1
+
+
+@pytest.mark.parametrize("gap", [0.01, 0.3])
+def test_thick_balls_side_by_side_are_not_thin(gap):
+    """Between them is no solid; without the bodies of facets nobody could tell."""
+    k = np.arange(300)
+    turn, z = np.pi * (3.0 - np.sqrt(5.0)) * k, 1.0 - (2.0 * k + 1.0) / 300
+    ball = np.stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z], axis=1)
+    hull = ConvexHull(ball)
+    inward = np.linalg.det(ball[hull.simplices]) < 0.0
+    facets = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    points = np.concatenate([[3.5, 4.1, 4.0] + 2.0 * ball, [7.5 + gap, 4.0, 4.1] + 2.0 * ball])
+    both, grid = np.concatenate([facets, facets + 300]), uniform([0, 0, 0], [12, 8, 8], [24, 16, 16])
+    assert thinness.may_be_thin(grid, both, points, 3.0)
+    assert not thinness.may_be_thin(grid, both, points, 3.0, thinness.solid_of(both, points, None))

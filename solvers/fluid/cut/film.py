@@ -28,8 +28,10 @@ SHARE_OF_FILM = 3e-3
 #: g / h below which the factor is constant. Nodes with little fluid have rounding errors of 1e-9 of the velocity,
 #: divided by the factor. Drags of films from 0.05 cells on are the same to 1.3 % from 0.1 to 1e-4.
 LEAST_RATIO = 0.1
-#: Sine of half of 45 degrees: normals are grouped by the nearest of eight directions in the plane.
-OCTANT = np.sin(np.pi / 8)
+#: Sine of 22.26 degrees. Components of normals below it count as zero: so normals are grouped by about the nearest of
+#: eight directions in the plane. With half of 45 degrees facets of a disc of 24 would lie between two groups, and
+#: rounding would choose. This angle over pi, [0; 8, 10, 1, 1, ...], is far from all simple fractions.
+OCTANT = np.sin(np.pi / (8.0 + 1.0 / (10.0 + 0.5 * (1.0 + np.sqrt(5.0)))))
 #: Product of the unit normals below which two walls are opposite: the angle between them is at most 60 degrees.
 OPPOSITE = -0.5
 #: Share of the section of its cell, normal to n, that a wall of a film has, there or in a cell beside. A notch, as

@@ -20,7 +20,7 @@ from solvers.fluid.geometry.thin.sheet_cycles import joined_in, recurring, unite
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, same_nodes
 from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
-from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
+from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin, solid_of
 from solvers.fluid.geometry.thin.walls import facets_of_walls
 from solvers.fluid.grid.box import Grid
 from solvers.fluid.grid.nested import Nested
@@ -95,11 +95,14 @@ class ThinBodies:
 
     def _may_be_thin(self, facets: NDArray[np.int64], x: Array) -> bool:
         grid, most = self._grid, thickest(self._grid.dim)
+        body = solid_of(facets, x, self._tied)
+
+        def thin(some: NDArray[np.bool_], thick: float) -> bool:
+            return may_be_thin(grid, facets[some], x, thick, body[some])
+
         if not self._touch:
-            return may_be_thin(grid, facets[self._wet], x, most)
-        if may_be_thin(grid, facets[self._wet], x, THICK_IN_CONTACT[grid.dim]):
-            return True
-        return may_be_thin(grid, facets[self._wet & facets_of_walls(grid, facets, x)], x, most)
+            return thin(self._wet, most)
+        return thin(self._wet, THICK_IN_CONTACT[grid.dim]) or thin(self._wet & facets_of_walls(grid, facets, x), most)
 
     def _at(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
         """Sheets at a position, where the parts are joined that a cycle of this step has joined.

@@ -28,7 +28,7 @@ from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touc
 from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND, FluidParts, grown, parts_of_fluid, ragged
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
-from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin
+from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin, solid_of
 from solvers.fluid.geometry.tied_slits import slivers_of, without_slits
 from solvers.fluid.grid.box import CORNER_STEPS, Grid
 from solvers.fluid.surfaces.immersed import ImmersedBody
@@ -262,7 +262,7 @@ def find_sheets(
     if not len(facets):
         return None
     may_close = closing and may_touch(grid, facets, x)
-    may_part = always or (thin > 0 and (grid.dim == 2 or may_be_thin(grid, facets, x, CELL_DIAGONAL * (thin + 1))))
+    may_part = always or (thin > 0 and (grid.dim == 2 or _some_are_thin(grid, facets, x, thin, tied)))
     if not (may_part or may_close):
         return None
     x = without_slivers(grid, facets, x)
@@ -340,6 +340,11 @@ def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: in
     pairs = cKDTree(index).query_pairs(thin + 0.5, p=np.inf, output_type="ndarray") if len(close) else index[:, :2]
     first, second = close[pairs].T
     return np.unique(close[pairs][(facing[first] * facing[second]).sum(axis=1) < OPPOSITE_NORMALS])
+
+
+def _some_are_thin(grid: Grid, facets: Indices, x: Array, thin: int, tied: tuple[Mask, Mask] | None) -> bool:
+    body = solid_of(facets, x, None if tied is None else tied[0])
+    return may_be_thin(grid, facets, x, CELL_DIAGONAL * (thin + 1), body)
 
 
 def _is_thin(grid: Grid, cells: Indices, links: Indices, facing: Array, close: Indices, thin: int) -> bool:
