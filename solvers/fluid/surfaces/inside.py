@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.kernels import seen_angles
 from solvers.fluid.surfaces.surface import ImmersedSurface, Motion, together
+from solvers.kernels import seen_angles
 
 #: Sine of the angle, or of the solid angle, between a point and the plane of a facet up to which it lies in this plane.
 IN_PLANE = 1e-9
