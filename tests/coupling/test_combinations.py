@@ -122,16 +122,15 @@ def immersed(scene) -> dict[str, str]:
 def elastic(scene) -> str:
     """A plate across the channel, or a block that is pressed on its floor."""
     kind, dim = scene["body"], scene["dim"]
-    height, depth, sides = (1.0, None, "bottom, top") if dim == 2 else (0.75, (0, 0.75), "y_low, y_high")
-    if dim == 3:
-        sides = "bottom, top"
+    height, depth = (1.0, None) if dim == 2 else (0.75, (0, 0.75))
     if kind == "thin elastic":
         mesh = shape(dim, (0.71, 0), (THICKNESS, height), cells=(1, 6), depth=depth)
-        support, contact = f"{{on: [{sides}], displacement: {[0] * dim}}}", ""
+        support, contact = f"{{on: [bottom, top], displacement: {[0] * dim}}}", ""
     else:
-        mesh = shape(dim, (0.53, 0.01), (0.41, 0.3), cells=(3, 2), depth=(0.2, 0.33))
+        low, size, depth = ((0.53, 0.01), (0.41, 0.3), None) if dim == 2 else ((0.53, 0.2), (0.41, 0.33), (0.01, 0.3))
+        mesh = shape(dim, low, size, cells=(3, 2), depth=depth)
         down = vector(*["0"] * (dim - 1), "-0.03*min(5*t,1)", dim=dim)
-        floor = shape(dim, (-1, -0.1), (4, 0.1))
+        floor = shape(2, (-1, -0.1), (4, 0.1)) if dim == 2 else shape(3, (-1, -1), (4, 3), depth=(-0.1, 0.1))
         support = f"{{on: top, displacement: {down}}}"
         contact = f"""
 contact:
