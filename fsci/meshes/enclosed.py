@@ -245,19 +245,23 @@ def _flow(fluid: FluidSection, name: str, t: float, part: Mask | None = None) ->
 
 
 def _displaced(places: Places, name: str, begin: float, end: float) -> tuple[float, float]:
-    """(minus the volume in the box that a body displaces, integral of its surface's speed there) [m^dim/s]."""
+    """(minus the volume in the box that a body displaces, what its surface moves there) [m^dim/s].
+
+    That is the integral of the speed, or the sum over cells where facets are larger than the box: their middles are
+    outside.
+    """
     (before, facets), _ = places.at(name, begin)
     (after, _), velocity = places.at(name, end)
     if not (places.reach_boundary(before) or places.reach_boundary(after)):
         return 0.0, 0.0
     planes = places.fluid.grid.planes
     volume = np.prod(np.stack(np.meshgrid(*(np.diff(plane) for plane in planes), indexing="ij")), axis=0)
-    grown = float(((places.solid((after, facets)) - places.solid((before, facets))) * volume).sum())
+    grown = (places.solid((after, facets)) - places.solid((before, facets))) * volume
     inside = places.inside(after[facets].mean(axis=1))
     area = np.linalg.norm(area_vectors(after[facets]), axis=1)
     speed = np.linalg.norm(velocity[facets].mean(axis=1), axis=1)
-    rate = -grown / (end - begin)
-    return rate, max(float((area * speed)[inside].sum()), abs(rate))
+    moved = max(float((area * speed)[inside].sum()), float(np.abs(grown).sum()) / (end - begin))
+    return -float(grown.sum()) / (end - begin), moved
 
 
 def _box_of(fluid: FluidSection, points: Array) -> tuple[slice, ...]:

@@ -18,6 +18,7 @@ from ._kernels import (
     nodal_normals,
     node_blocks,
     row_squares,
+    seen_angles,
     spread_blocks,
     surface_rows,
 )

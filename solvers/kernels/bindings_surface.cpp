@@ -1,6 +1,7 @@
-// Python name of surface_rows.hpp: surface_rows.
+// Python names of surface_rows.hpp and windings.hpp: surface_rows, seen_angles.
 #include "bindings.hpp"
 #include "surface_rows.hpp"
+#include "windings.hpp"
 
 namespace {
 
@@ -35,6 +36,24 @@ void py_surface_rows(const Values<const double, 3>& moments, const Values<const 
     else surface_rows<3>(pieces, at, rows.data());
 }
 
+nb::object py_seen_angles(const Values<const double, 2>& points, const Values<const double, 2>& vertices,
+                          const Values<const std::int64_t, 2>& facets, double in_plane) {
+    const std::size_t dim = vertices.shape(1), count = points.shape(0), size = vertices.shape(0);
+    require(dim == 2 || dim == 3, "vertices have two or three coordinates");
+    require_shape("points", points, count, dim);
+    require_shape("facets", facets, facets.shape(0), dim);
+    for (std::size_t k = 0; k < facets.size(); ++k)
+        require(facets.data()[k] >= 0 && static_cast<std::size_t>(facets.data()[k]) < size,
+                "facets name vertices that are not there");
+    std::vector<double> found(count);
+    {
+        nb::gil_scoped_release release;
+        const auto of = dim == 2 ? seen_angles<2> : seen_angles<3>;
+        of(points.data(), count, vertices.data(), size, facets.data(), facets.shape(0), in_plane, found.data());
+    }
+    return to_numpy(std::move(found), {count});
+}
+
 }  // namespace
 
 void bind_surface(nb::module_& module) {
@@ -43,4 +62,7 @@ void bind_surface(nb::module_& module) {
                "Set `rows`, (pieces, functions, vertices, dim, dim + 1), to the rows of the flow by the motion of vertices.\n\n"
                "rows[p, a, c, j, i] = n_j sum_q moments[p, q, c] density[cell, q, a, i] - int phi_a by_motion[p, c, j, i],\n"
                "and - leak int d_j phi_a N_c in the last i.");
+    module.def("seen_angles", &py_seen_angles, "points"_a, "vertices"_a, "facets"_a, "in_plane"_a,
+               "Sum of the angles of segments, or of halves of solid angles of triangles, seen from points, shape (points,).\n\n"
+               "in_plane: sine of the angle between a point and the plane of a facet up to which the facet is not seen.");
 }

@@ -257,6 +257,9 @@ private:
   }
 
   void integrate_surface() {
+    std::size_t pieces = 0;  // at least as many as rows: without it rows move as the table grows
+    for (const CellRegions& here : cells_) pieces += here.surface.size();
+    table_.piece_moments.reserve(pieces * 3 * size);
     std::vector<int> order;
     std::array<double, size> no_flux{};
     for (std::size_t c = 0; c < cells_.size(); ++c) {

@@ -49,10 +49,13 @@ def squeezed(folder, inner, end, x=0.0):
     return history, history["fluid.pocket_1"] / (16 * inner**2 * np.sin(np.pi / 16))
 
 
-@pytest.mark.parametrize("inner", [0.12, 0.24])
-def test_walls_of_any_thickness_are_tight(tmp_path, inner):
-    """3.6 and 1.4 cells; before contact. With shared unknowns the thick one loses 0.3 %."""
-    _, volume = squeezed(tmp_path, inner, 0.1)
+@pytest.mark.parametrize(("inner", "x"), [(0.045, 0.0), (0.045, 0.0185), (0.12, 0.0), (0.24, 0.0)])
+def test_walls_of_any_thickness_are_tight(tmp_path, inner, x):
+    """5, 3.6 and 1.4 cells; before contact. With shared unknowns the middle one loses 0.3 %.
+
+    No cell is full in the first ring, also moved by a third of a cell: it lost 8 % by 0.24 s, and nothing was said.
+    """
+    _, volume = squeezed(tmp_path, inner, 0.1, x)
     np.testing.assert_allclose(volume, 1.0, rtol=1e-9)
 
 

@@ -42,6 +42,27 @@ structure:
 coupling: {}
 """
 COVER = "shape: rectangle, size: [3, 3], cells: [4, 1], origin: [-0.5, -1]}}"
+#: middles of facets are outside of the box, and what the wall displaces there is rounding
+LARGE = """\
+time: {step: 0.1, end: 0.2}
+fluid:
+  density: 1
+  viscosity: 0.05
+  grid: {from: [0, 0, 0], to: [1.5, 0.75, 0.75], cells: [12, 6, 6]}
+  patches:
+    ends: {on: [x-, x+], periodic: true}
+    walls: {on: [y-, y+, z-, z+], slip: true}
+  bodies:
+    half:
+      mesh:
+        shape: box
+        size: [0.03, 1.4, 3]
+        cells: [1, 1, 1]
+        origin: [-0.015, -0.08, -1]
+        rotate: {angle: 7, axis: [0, 0, 1]}
+        translate: [0.59, 0.36, 0]
+      motion: {displacement: [0.3*t, 0, 0]}
+"""
 
 NO_OUTLET = "and cannot leave: give an outlet (a patch with outflow, pressure or traction)"
 REFUSED = {
@@ -85,6 +106,7 @@ RIGHT = {
     "another profile out": ALONE.replace("walls:", 'out: {on: x+, velocity: ["ramp(t, 0, 0.3)/6", 0]}\n    walls:'),
     "a lid": ALONE.replace('["y*(1 - y)*ramp(t, 0, 0.3)", 0]', "[0, 1]"),
     "an elastic wall across": CHANNEL[: CHANNEL.index("  bodies:")] + ELASTIC,
+    "a wall with facets larger than a periodic box": LARGE,
     "elastic bodies in a closed box": ALONE.replace("ramp(t, 0, 0.3)", "0.01*t") + ELASTIC,
     "a free wall across": ACROSS.replace("0.15]}}", "0.15]}, free: {density: 1}}") + "coupling: {}\n",
     "a wall that opens": ACROSS.replace("0.15]}}", "0.15]}, motion: {displacement: [0, 2*t]}}").replace(

@@ -31,7 +31,7 @@ class WatchedPocket:
     name: str
     since: float  #: time [s] when it closed
     volume: float  #: at present [m^3]
-    cells: Indices  #: numbers in the box of its cells full of fluid, sorted
+    cells: Indices  #: numbers in the box of its cells full of fluid, sorted; a small cavity has none
     due: list[float] = field(default_factory=list)  #: volumes that it should have had, newest first [m^3]
     surface: Indices | None = None  #: facets that bound it, of a cavity
 
@@ -48,13 +48,16 @@ class Pockets:
         self._count = 0  #: pockets so far
 
     def start(self, t: float) -> None:
-        """Find the pockets at the start, cavities first (collective)."""
+        """Find the pockets at the start, cavities first (collective).
+
+        Cavities without a cell full of fluid count where no body is in them: they may be gaps, or closed, else.
+        """
         fluid, box = self._fluid, self._fluid.grid.grid.edges
         corners = [np.array([edge[side] for edge in box]) for side in (0, -1)]
         cut, found = fluid.cut, self._regions.now()
         for cavity in find_cavities(cut.facets, cut.motion.x, self._wet, corners) if len(cut.facets) else []:
             cells = self._cells_in(cavity, found)
-            if len(cells):
+            if len(cells) or len(cavity.facets) == len(cavity.wall):
                 self._add(t, -enclosed(cut.motion.x, cut.facets[cavity.facets]), cells, cavity.facets)
         self._follow(t, found)
         self._columns = self._count
@@ -126,6 +129,9 @@ class Pockets:
         return Finding("pocket", pocket.name, change, message, where=where)
 
     def _middle(self, pocket: WatchedPocket) -> tuple[float, ...]:
+        if not len(pocket.cells):
+            cut = self._fluid.cut
+            return tuple(cut.motion.x[np.unique(cut.facets[pocket.surface])].mean(axis=0).tolist())
         low, size = place_of(self._fluid.grid.grid, pocket.cells)
         return tuple((low + 0.5 * size).mean(axis=0).tolist())
 
