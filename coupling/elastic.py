@@ -142,11 +142,19 @@ class Elastic:
 
     def spread(self, force: Array) -> Array:
         """Forces [N] at owned dofs of the structure, from those on vertices (n, dim)."""
-        force = self._on_nodes(force)
+        return self._owned(self._on_nodes(force))
+
+    def spread_by_size(self, values: Array) -> Array:
+        """As `spread`, but with the absolute values of its shares, whose signs differ on second-order surfaces."""
+        if self._mixture is None:
+            return self.spread(values)
+        return self._owned(replace(self._mixture, data=np.abs(self._mixture.data)).T @ values)
+
+    def _owned(self, at_nodes: Array) -> Array:
         local = self.dofs - self.structure.layout.start
         mine = (local >= 0) & (local < self.size)
         total = np.zeros(self.size)
-        np.add.at(total, local[mine], force[mine])
+        np.add.at(total, local[mine], at_nodes[mine])
         return total
 
     def reduced(self, force: Array) -> Array:

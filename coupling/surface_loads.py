@@ -11,6 +11,11 @@ from coupling.elastic import Elastic
 from solvers.api import Array
 from solvers.mesh.tessellation import tangential, vertex_shares
 
+#: Share of a node over that of the vertices around it, below which it has hardly any: it is 4/9 and more at nodes of
+#: segments and quadrilaterals; at corners of second-order triangles, which a uniform pressure does not load, it is the
+#: square of their angle with their neighbours.
+LITTLE = 0.1
+
 
 def surface_loads(
     elastic: Elastic, force: Mapping[str, Array], x: Mapping[str, Array], facets: Mapping[str, NDArray[np.int64]]
@@ -18,14 +23,17 @@ def surface_loads(
     """Field -> values [Pa] at owned dofs of the structure, zero off the surface (collective).
 
     traction: force [N] of the flow at a node by its share of the present surface, such that shares and tractions give
-    the force exactly; wall_shear_stress: its tangential part. By surface: force and positions x [m] at vertices, shape
-    (n, dim), and their segments or triangles.
+    the force exactly; at nodes with hardly any share the mean of the vertices around. wall_shear_stress: its tangential
+    part. By surface: force and positions x [m] at vertices, shape (n, dim), and their segments or triangles.
     """
     names: Sequence[str] = list(elastic.surfaces)
     dim = elastic.dofs.shape[1]
     areas, normals = zip(*(vertex_shares(x[name], facets[name]) for name in names), strict=True)
     shares = [np.tile(area[:, None], dim) for area in areas]  # in all components
-    at_nodes = [elastic.spread(np.concatenate(some)) for some in ([force[name] for name in names], shares, normals)]
-    load, share, direction = (values.reshape(-1, dim) for values in at_nodes)
+    at_vertices = [np.concatenate(some) for some in ([force[name] for name in names], shares, normals)]
+    load, share, _ = (elastic.spread(values).reshape(-1, dim) for values in at_vertices)
+    around, size, direction = (elastic.spread_by_size(values).reshape(-1, dim) for values in at_vertices)
+    little = share < LITTLE * size
+    load, share = np.where(little, around, load), np.where(little, size, share)
     traction = np.divide(load, share, out=np.zeros_like(load), where=share > 0.0)
     return {"traction": traction.ravel(), "wall_shear_stress": tangential(traction, direction).ravel()}

@@ -44,11 +44,9 @@ def cut_out_skin(mesh: Mesh, names: Sequence[str] | None = None) -> Skin:
 def middle_vertices(mesh: Mesh, nodes: Indices) -> tuple[Indices, ...]:
     """Vertices in the middle of second-order facets and their edges, with the corners around; see `Skin.middles`.
 
-    nodes: of the mesh, by vertex. None of triangles, to whose corners a uniform load gives no force.
+    nodes: of the mesh, by vertex.
     """
     facet = CELL_TYPES[CELL_TYPES[mesh.cell_type].facet]
-    if facet.shape.simplex and facet.corners > 2:
-        return ()
     vertex = np.full(len(mesh.points), -1)
     vertex[nodes] = np.arange(len(nodes))
     facets = vertex[boundary_facets(mesh)]

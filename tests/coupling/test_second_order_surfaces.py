@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from test_coupled_run import run
 
+import fsci
 from coupling.wetted import bulge
 from fsci.shapes import SHAPES
 from solvers.mesh.skin import cut_out_skin
 from solvers.mesh.tessellation import area_vectors
+from solvers.mesh.topology import boundary_facets
 
 
 def enclosed(points, facets):
@@ -62,10 +64,12 @@ def test_forces_of_a_uniform_pressure(name, settings):
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3])
-@pytest.mark.parametrize(("name", "cells"), [("disc", [16, 2]), ("sphere", [2, 1])])
-def test_a_uniform_pressure_on_a_curved_body_has_no_force_and_no_moment(name, cells, size):
+@pytest.mark.parametrize(
+    ("name", "cells", "cell"), [("disc", [16, 2], "quad"), ("sphere", [2, 1], "hex"), ("sphere", [2, 1], "tet")]
+)
+def test_a_uniform_pressure_on_a_curved_body_has_no_force_and_no_moment(name, cells, cell, size):
     """Turned, moved by a third, of any size: of forces at nodes, in their places, with the area of the vertices."""
-    skin = cut_out_skin(shape(name, radius=size, cells=cells, order=2))
+    skin = cut_out_skin(shape(name, radius=size, cells=cells, cell=cell, order=2))
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((skin.points.shape[1],) * 2))[0]
     turn[0] *= np.linalg.det(turn)  # no reflection
     x = skin.points @ turn.T + size / 3
@@ -83,10 +87,21 @@ def test_a_uniform_pressure_on_a_curved_body_has_no_force_and_no_moment(name, ce
     assert np.trace(moment) / dim == pytest.approx(enclosed(mixture @ x, skin.facets), rel=1e-12)
 
 
-def test_triangles_have_the_nodes_as_vertices():
-    """At their corners a uniform pressure gives no force, by which a traction could be divided."""
-    skin = cut_out_skin(shape("box", size=[1.0, 1.0, 1.0], cells=[1, 1, 1], order=2, cell="tet"))
-    assert bulge(skin) is None
+def test_forces_of_a_uniform_pressure_on_triangles():
+    """Those of the element: a third of each triangle at the middles of its edges, nothing at its corners."""
+    mesh = shape("box", size=[1.0, 0.5, 0.7], cells=[3, 2, 1], order=2, cell="tet")
+    skin = cut_out_skin(mesh)
+    vectors = area_vectors(skin.points[skin.facets])
+    at_vertices, exact = np.zeros_like(skin.points), np.zeros_like(skin.points)
+    for corner in range(3):
+        np.add.at(at_vertices, skin.facets[:, corner], vectors / 3.0)
+    vertex = np.full(len(mesh.points), -1)
+    vertex[skin.nodes] = np.arange(len(skin.nodes))
+    facets = vertex[boundary_facets(mesh)]
+    area = area_vectors(skin.points[facets[:, :3]])
+    for middle in (3, 4, 5):
+        np.add.at(exact, facets[:, middle], area / 3.0)
+    assert bulge(skin).T @ at_vertices == pytest.approx(exact, abs=1e-14)
 
 
 COLUMN = """\
@@ -119,10 +134,14 @@ solver: {newton: {residual: 1.0e-11}}
 """
 
 
+@pytest.mark.parametrize("cell", ["hex", "tet"])
 @pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
-def test_a_plane_surface_stays_plane(tmp_path, scheme):
+def test_a_plane_surface_stays_plane(tmp_path, scheme, cell):
     """u E / h = -rho g (H - h - u) at all nodes of a block in space, whatever their place in the facets."""
-    history = run(COLUMN.replace("scheme: monolithic", f"scheme: {scheme}"), tmp_path)
+    history = run(
+        COLUMN.replace("scheme: monolithic", f"scheme: {scheme}").replace("order: 2", f"order: 2, cell: {cell}"),
+        tmp_path,
+    )
     exact = -1e4 * 0.57 / (1e5 / 0.43 - 1e4)
     for name in ("middle", "corner", "side"):
         assert history[f"{name}.z"][-1] == pytest.approx(exact, rel=1e-6 if scheme == "partitioned" else 1e-8), name
@@ -169,3 +188,18 @@ def test_bodies_of_both_orders_beside_each_other(tmp_path, left, right):
     history = run(BLOCKS.format(left=left, right=right), tmp_path)
     for name, E in (("left", 1e5), ("right", 2e5)):
         assert history[f"{name}.y"][-1] == pytest.approx(-1e4 * 0.57 / (E / 0.43 - 1e4), rel=1e-7), name
+
+
+@pytest.mark.parametrize("cell", ["hex", "tet"])
+def test_traction_at_all_nodes(tmp_path, cell):
+    """Inside of the surface it is the pressure of the column, also at corners of triangles, which it does not load."""
+    (tmp_path / "case.yaml").write_text(COLUMN.replace("[2, 1, 1], order: 2", f"[4, 2, 1], order: 2, cell: {cell}"))
+    steps = fsci.build(fsci.load(tmp_path))
+    assert list(steps) == [1.0]
+    block = steps.fields()["block"]
+    x, y, z = block.points.T
+    top = (z > 0.4) & (np.abs(x - 0.5) < 0.49) & (np.abs(y - 0.25) < 0.24)  # edges belong to the sides, too
+    assert top.sum() == 21
+    pressure = 1e4 * (0.57 + 1e4 * 0.57 / (1e5 / 0.43 - 1e4))
+    exact = np.tile([0.0, 0.0, -pressure], (21, 1))
+    assert block.point_data["traction"][top] == pytest.approx(exact, rel=1e-8, abs=1e-8 * pressure)
