@@ -13,8 +13,9 @@ class Lagged:
     """Solves with the preconditioner of an earlier matrix of the step while it is good enough.
 
     The first `fresh` matrices of a step get their own preconditioners. The last of these is reused until a solve fails
-    or takes more than `patience` times the iterations per digit that it took for its own matrix. Nothing is kept from
-    step to step, so that resumed runs give the same results.
+    or takes more than `patience` times the iterations per digit that it took for its own matrix. A solve ends with
+    `FEW` iterations more than that, which take the time of a new preconditioner. Nothing is kept from step to step, so
+    that resumed runs give the same results.
     """
 
     def __init__(self, *, fresh: float = 1, patience: float = 2.0):
@@ -32,10 +33,15 @@ class Lagged:
         if kept is None or self.made < self.fresh:
             return None
         ksp, made_of, first = kept
+        most = ksp.getTolerances()[3]
+        if self.patience < math.inf:
+            ksp.setTolerances(max_it=min(most, math.ceil(self.patience * first * digits(ksp, reduction)) + linear.FEW))
         try:
             linear.solve(ksp, matrix, b, x, made_of, reduction=reduction, few=0)
         except linear.LinearSolveFailed:
             return None
+        finally:
+            ksp.setTolerances(max_it=most)
         iterations = int(ksp.getIterationNumber())
         if iterations / digits(ksp, reduction) <= self.patience * first:
             self._kept = kept

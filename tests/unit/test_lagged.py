@@ -79,9 +79,22 @@ def test_a_preconditioner_that_no_longer_serves_is_discarded() -> None:
     again = lagged.solve_again(*system((BASE + 0.51 * NEAR).tocsr()))
     assert again is not None
     assert again <= 2 * first
-    last = lagged.solve_again(*system((BASE + 5.0 * NEAR).tocsr()))
+    last = lagged.solve_again(*system((BASE + 2.0 * NEAR).tocsr()))
     assert last is not None
     assert last > 2 * first
+    assert lagged.solve_again(*system(BASE)) is None
+
+
+def test_a_solve_that_takes_as_long_as_a_new_preconditioner_ends() -> None:
+    """With ten iterations more than twice as many as for its own matrix; the solver has its bound again then."""
+    lagged, ksp = Lagged(), flexible_solver(PETSc.COMM_SELF, tolerance=1e-8)
+    most = ksp.getTolerances()[3]
+    ksp.getPC().setType(PETSc.PC.Type.ILU)
+    first = lagged.solve(ksp, *system((BASE + 0.5 * NEAR).tocsr()))
+    far = system((BASE @ sparse.diags(10.0 ** np.random.default_rng(4).uniform(-3.0, 3.0, SIZE))).tocsr())
+    assert lagged.solve_again(*far) is None
+    assert 2 * first < ksp.getIterationNumber() <= 2 * first + 11
+    assert ksp.getTolerances()[3] == most
     assert lagged.solve_again(*system(BASE)) is None
 
 
