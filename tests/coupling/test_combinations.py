@@ -183,7 +183,7 @@ probes:{probes}
   flow: {{quantity: flow_rate, plane: {{point: {at}, normal: {vector(1, dim=dim)}}}}}
   speed: {{field: fluid, quantity: velocity, at: {at}}}
   energy: {{quantity: kinetic_energy}}
-solver: {{newton: {{residual: 1e-10}}, linear: {method}}}
+solver: {{newton: {{residual: 1e-11}}, linear: {method}}}
 output: {{fields_every: 0}}
 """
 
