@@ -69,6 +69,7 @@ def test_a_pocket_that_keeps_its_water_is_not(tmp_path):
     assert volume == pytest.approx(np.full(len(volume), volume[0]), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_resumed_and_parallel_runs_find_the_same(tmp_path):
     """A thin and soft ring that becomes oval: fluid gets lost in its wall."""
     text = RING.replace("SCHEME", "backward_euler").replace("0.32", "0.25").replace("E: 5000", "E: 100")

@@ -141,7 +141,9 @@ def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
         assert differ(one, several, name) < 1e-8, name
 
 
-@pytest.mark.parametrize("text", [NESTED, BALL], ids=["post", "ball"])
+@pytest.mark.parametrize(
+    "text", [pytest.param(NESTED, id="post"), pytest.param(BALL, id="ball", marks=pytest.mark.slow)]
+)
 def test_two_processes(text, tmp_path, nested):
     one = nested[1] if text is NESTED else run(text, tmp_path)
     (tmp_path / "case.yaml").write_text(text)

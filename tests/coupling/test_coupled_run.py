@@ -156,7 +156,13 @@ def test_resumed_bit_for_bit(whole, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("whole", "at"), [("monolithic", 1), ("monolithic", 3), ("iqn", 3), ("aitken", 1)], indirect=["whole"]
+    ("whole", "at"),
+    [
+        ("monolithic", 1),
+        ("iqn", 3),
+        *(pytest.param(scheme, at, marks=pytest.mark.slow) for scheme, at in (("monolithic", 3), ("aitken", 1))),
+    ],
+    indirect=["whole"],
 )
 def test_a_failed_step_does_not_change_the_state(at, whole, tmp_path, monkeypatch):
     """It is repeated as two halves; the same to the last bit whether it fails at its end or before it begins."""
@@ -199,7 +205,7 @@ def test_a_case_that_fails_at_once_says_so_and_keeps_a_checkpoint(tmp_path):
     [
         pytest.param(POST, "monolithic", id="post-monolithic"),
         pytest.param(POST, "iqn", id="post-iqn", marks=pytest.mark.slow),
-        pytest.param(BLOCK, "monolithic", id="block-monolithic"),
+        pytest.param(BLOCK, "monolithic", id="block-monolithic", marks=pytest.mark.slow),
         pytest.param(BLOCK, "iqn", id="block-iqn", marks=pytest.mark.slow),
         pytest.param(MEETING, "monolithic", id="contact-monolithic"),
         pytest.param(MEETING, "iqn", id="contact-iqn", marks=pytest.mark.slow),

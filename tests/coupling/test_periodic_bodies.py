@@ -59,7 +59,8 @@ def motion(folder, steps=5, **choices):
 
 @pytest.mark.parametrize("bodies", [FREE, ELASTIC], ids=["free", "elastic"])
 @pytest.mark.parametrize(
-    ("element", "scheme"), [("q1q1", "monolithic"), ("q2q1", "monolithic"), ("q2q1", "partitioned")]
+    ("element", "scheme"),
+    [("q1q1", "monolithic"), ("q2q1", "monolithic"), pytest.param("q2q1", "partitioned", marks=pytest.mark.slow)],
 )
 def test_it_moves_as_within_the_period(tmp_path, bodies, element, scheme):
     """By whole cells further, across the end, and in another period."""

@@ -171,6 +171,7 @@ FLOOR = """\
 """
 
 
+@pytest.mark.slow
 def test_an_elastic_disc_on_the_floor_of_another_period(tmp_path):
     """Walls go on along the periods."""
     known = motion(tmp_path, SOFT.format(disc=FLOOR.format(k=0, x=0.913)))

@@ -83,7 +83,7 @@ def history(folder, text):
         ("backward_euler", "monolithic"),
         ("bdf2", "monolithic"),
         pytest.param("bdf2_optimized", "monolithic", marks=pytest.mark.slow),
-        ("backward_euler", "partitioned"),
+        pytest.param("backward_euler", "partitioned", marks=pytest.mark.slow),
     ],
 )
 def test_ring_keeps_its_water(tmp_path, scheme, coupling):

@@ -88,6 +88,7 @@ def test_flap_that_opens_again(tmp_path):
     assert history["lower.x"][-1] + history["upper.x"][-1] == pytest.approx(-0.6, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_two_soft_flaps_that_open_again(tmp_path):
     """Both bend in contact. The film opens from its end: without the penalty in wedges steps fail there, at 2 s."""
     history = history_of(tmp_path, E=1e5, upper=1e7, end=3.5, back=1.6)

@@ -96,6 +96,7 @@ def flaps(folder, end, processes, resumed=None):
     return read_history(folder / "out" / "history.csv")
 
 
+@pytest.mark.slow
 def test_two_flaps(tmp_path):
     """A resumed run is the same bit for bit, and two processes give what one does."""
     whole = flaps(tmp_path / "whole", 0.12, 1)

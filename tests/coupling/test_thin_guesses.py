@@ -1,6 +1,7 @@
 """Thin elastic bodies that touch and part: the solution of a step does not depend on where its iterates were."""
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 from test_thin_contact import CASE
 
@@ -43,6 +44,7 @@ def from_two_guesses(folder, text, first, last, monkeypatch):
     return np.array(found).T
 
 
+@pytest.mark.slow
 def test_flaps_in_2d(tmp_path, monkeypatch):
     """First contact, and the two steps after it, in which flaps that have bounced touch and part in the iterates."""
     text = CASE.format(back=1.6, E=1e5, upper=1e7, end=3.5)
