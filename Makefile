@@ -115,6 +115,7 @@ bench: setup
 docs: $(DOCS_STAMP)
 	mkdir -p docs/reference
 	$(BIN)/fsci schema --markdown > docs/reference/case.md
+	$(BIN)/fsci schema > docs/reference/fsci.schema.json
 	$(BIN)/python docs/make_api.py > docs/reference/api.md
 	$(BIN)/python docs/make_constants.py > docs/reference/constants.md
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html

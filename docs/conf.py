@@ -18,3 +18,4 @@ linkcheck_retries = 2
 linkcheck_timeout = 20
 html_theme = "alabaster"
 html_theme_options = {"description": _project["description"], "page_width": "1080px"}
+html_extra_path = ["reference/fsci.schema.json"]

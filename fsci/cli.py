@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from fsci.argument_types import count, duration, override, share
-from fsci.failed_commands import broken, fail, with_notes
+from fsci.failed_commands import as_far_as_it_is_read, broken, fail, with_notes
 
 DESCRIPTION = "Fluid-structure-contact interaction from one YAML case file."
 EPILOG = """\
@@ -28,7 +28,7 @@ first steps:
 
 def main() -> None:
     """Entry point of the program `fsci`."""
-    sys.exit(execute(sys.argv[1:]))
+    sys.exit(as_far_as_it_is_read(lambda: execute(sys.argv[1:])))
 
 
 def execute(arguments: Sequence[str]) -> int:
@@ -319,7 +319,7 @@ def _run(options: argparse.Namespace) -> int:
         from fsci.running.processes import ending_together
         from fsci.running.run import run_case
 
-        out = options.out or Path("results") / case.folder.absolute().name
+        out = options.out or Path("results") / case.name
         with ending_together(MPI.COMM_WORLD, CaseError):
             return int(run_case(case, out, force=options.force))
     except CaseError as error:
@@ -446,7 +446,9 @@ def _printed(name: str, make: Callable[[], Iterable[object]]) -> int:
     from fsci.case import CaseError
 
     try:
-        print("\n".join(str(line) for line in make()))
+        print("\n".join(str(line) for line in make()), flush=True)
+    except BrokenPipeError:
+        raise
     except CaseError as error:
         return fail(str(error))
     except (OSError, ValueError, RuntimeError) as error:
@@ -493,5 +495,4 @@ def _stress(options: argparse.Namespace) -> int:
 def _schema(options: argparse.Namespace) -> int:
     from fsci.schema import json_schema, reference_markdown
 
-    print(reference_markdown() if options.markdown else json_schema())
-    return 0
+    return _printed("schema", lambda: [reference_markdown() if options.markdown else json_schema()])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Callable
 
 
 def with_notes(error: Exception) -> str:
@@ -22,3 +24,14 @@ def broken(command: str, error: BaseException) -> int:
 
     print(f"fsci {command}: {describe(error)}", file=sys.stderr)
     return 3 if isinstance(error, KeyboardInterrupt) else 1
+
+
+def as_far_as_it_is_read(command: Callable[[], int]) -> int:
+    """Exit code of a command whose output may have a reader that stops, such as `head`: then it ends without a word."""
+    try:
+        code = command()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python writes the rest at its end
+        return 1
+    return code

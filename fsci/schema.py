@@ -34,10 +34,14 @@ length, mass and time.
 COMMON = ("order", "cell", "surfaces", "mirror", "rotate", "translate")
 
 
+#: By which editors and other schemas name that of case files, whichever file it is in.
+IDENTIFIER = "urn:fsci:case"
+
+
 def json_schema() -> str:
     """JSON schema of the case format."""
-    schema = _with_include(_schema())
-    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": IDENTIFIER, "title": "Case of fsci"}
+    return json.dumps({**_with_include(_schema()), **head}, indent=2)
 
 
 def _schema() -> dict[str, Any]:

@@ -83,6 +83,12 @@ class Case(Section):
         return self._document.path.parent
 
     @property
+    def name(self) -> str:
+        """Name of the file without its endings; of `case.yaml` that of the folder."""
+        path = self._document.path.absolute()
+        return path.parent.name if path.name == "case.yaml" else path.name.partition(".")[0]
+
+    @property
     def settings(self) -> dict[str, Any]:
         """What the file says, overrides applied; not to be changed."""
         return dict(self._document.data)

@@ -160,6 +160,26 @@ def test_results_go_to_the_name_of_the_case(beam, calls, path):
     assert calls[0][1][1].resolve() == Path("results/beam").resolve()
 
 
+@pytest.mark.parametrize("name", ["stiff.yaml", "stiff.fsci.yaml"])
+def test_cases_in_one_folder_have_results_of_their_own(beam, calls, name):
+    (beam / name).write_text((beam / "case.yaml").read_text())
+    execute(["run", str(beam / name)])
+    assert calls[0][1][1] == Path("results/stiff")
+
+
+@pytest.mark.parametrize("words", ["schema", "check beam"])
+def test_a_reader_that_stops_ends_a_command_without_a_word(beam, words):
+    """As `fsci schema | head`: the pipe has no reader any more."""
+    read, write = os.pipe()
+    os.close(read)
+    run = subprocess.Popen([sys.executable, "-m", "fsci", *words.split()], stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    _, said = run.communicate(timeout=60)
+    assert b"Error" not in said
+    assert b"pipe" not in said
+    assert run.returncode == 1
+
+
 def test_run_refuses_a_bad_case_before_it_starts(beam, calls, capsys):
     assert execute(["run", "beam", "--set", "time.step=0"]) == 2
     assert calls == []

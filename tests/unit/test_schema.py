@@ -53,6 +53,7 @@ def test_links_of_the_reference_lead_somewhere():
 
 def test_json_schema():
     schema = json.loads(json_schema())
+    assert schema["$id"] == "urn:fsci:case"
     assert schema["else"]["required"] == ["time"]
     assert schema["additionalProperties"] is False
     step = schema["$defs"]["Time"]["properties"]["step"]
