@@ -140,16 +140,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     plot.add_argument("--movie", action="store_true", help="make an animation too")
     plot.add_argument(
-        "--mirror",
-        dest="mirrors",
-        metavar="PLANE",
-        action="append",
-        default=[],
-        help="draw both sides of a plane of symmetry, of which one was computed: --mirror y=0; may be repeated",
+        "--scale", metavar="FACTOR", type=float, default=1.0, help="draw displacements times a factor (default: 1)"
     )
-
     plot._negative_number_matcher = re.compile(r"-[\d.]")  # coordinates may be negative: --line -1,0:1,0
     for name, metavar, words in (
+        ("mirror", "PLANE", "draw both sides of a plane of symmetry, of which one was computed: --mirror y=0"),
         ("line", "FROM:TO", "only fields along a line, as a table and curves: --line 0,0.2:2.5,0.2"),
         ("surface", "BODY", "only fields along the surface of a body, as a table and, in 2D, curves"),
     ):
@@ -366,6 +361,7 @@ def _plot(options: argparse.Namespace) -> int:
             movie=options.movie,
             field=options.field,
             times=options.times,
+            scale=options.scale,
             mirrors=options.mirrors,
             lines=options.lines,
             surfaces=options.surfaces,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,12 @@ class Kept:
     files: Mapping[str, bytes]  #: those that the case names
     summary: Mapping[str, Any]
     history: History
+
+    @property
+    def columns(self) -> list[str]:
+        """Those of probes, and the forces of contact."""
+        forces = [name for name in self.history if re.fullmatch(r"contact\..+\.[xyz]", name)]
+        return [*self.summary.get("probes", ()), *forces]
 
 
 def diff(folders: Sequence[Path], out: Path) -> list[str]:
@@ -87,7 +94,8 @@ def _presence(name: str, first: Mapping[str, bytes], other: Mapping[str, bytes])
 
 def _table(first: Kept, other: Kept) -> Iterator[str]:
     own, others = (
-        values(run.history, run.summary) if len(run.history.get("time", ())) else {} for run in (first, other)
+        values(run.history, {**run.summary, "probes": run.columns}) if len(run.history.get("time", ())) else {}
+        for run in (first, other)
     )
     if not own or not others:
         return
@@ -110,10 +118,10 @@ def _percent(share: float, sign: str = "-") -> str:
 
 
 def _draw(runs: Sequence[Kept], out: Path) -> Iterator[Path]:
-    """A picture for each probe, with a panel for each of its columns and a line for each run."""
+    """A picture for each probe and each pair in contact: a panel for each column, with a line for each run."""
     families: dict[str, list[str]] = {}
     for run in runs:
-        for name in run.summary.get("probes", ()):
+        for name in run.columns:
             columns = families.setdefault(name.rpartition(".")[0] or name, [])
             if name not in columns:
                 columns.append(name)
@@ -127,6 +135,6 @@ def _draw(runs: Sequence[Kept], out: Path) -> Iterator[Path]:
         }
         if any(len(times) > 1 for lines in curves.values() for times, _ in lines.values()):
             out.mkdir(parents=True, exist_ok=True)
-            quantity = measured(family, quantities)
+            quantity = "force" if family.startswith("contact.") else measured(family, quantities)
             named = {label(column, quantity, units, flat=flat): curves[column] for column in columns}
             yield plot_lines(out / f"diff_{family}.png", named, label("time", "time", units))

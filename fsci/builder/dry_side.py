@@ -98,7 +98,9 @@ def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
         wet = fluid.cut.motion.x[fluid.moving.surfaces.vertices_of([side.behind])]
         closing = Closing(side.ends, np.clip(side.corners, low, high), side.facets)
         points, lines = closing.together(wet, surfaces[side.behind].facets)
-        found.append(Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}))
+        found.append(
+            Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}, {"dry": np.ones(len(lines))})
+        )
     return found
 
 

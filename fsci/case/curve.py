@@ -100,7 +100,8 @@ def _read_csv(folder: Path, name: str) -> Array:
         return points
     for number, line in rows:
         if _numbers(line) is None:
-            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'", "csv")
+            point = "; decimals have a point" if re.search(r"\d,\d+\s*;", line) else ""
+            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'{point}", "csv")
     return np.array([_numbers(line) for _, line in rows])
 
 

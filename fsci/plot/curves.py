@@ -53,6 +53,7 @@ OWN_COLUMNS = {
     "coupling.newton": ("Newton iterations of the fields in a step", ""),
 }
 NODES = "contact nodes"  #: a panel
+WORKS = {"friction": "work of friction"}  #: numbers of all pairs that are energies -> their titles
 CONTACT_PREFIX = "contact."  #: prefix of the columns of contact
 NEGLIGIBLE, SMALL = (
     1e-3,
@@ -123,7 +124,10 @@ def contact_panels(history: History, units: Mapping[str, str], *, flat: bool = F
         if not name.startswith(CONTACT_PREFIX):
             continue
         if number in ("x", "y", "z"):
-            panels.setdefault((f"contact force of {pair}", "force"), {})[number] = values
+            where = pair.replace("on_", "on ", 1) if pair.startswith("on_") else f"of {pair}"
+            panels.setdefault((f"contact force {where}", "force"), {})[number] = values
+        elif number in WORKS:
+            panels[WORKS[number], "energy"] = {"": values}
         elif pair:
             panels[f"contact {number} of {pair}", f"contact_{number}"] = {"": values}
         else:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.derived import TENSOR
+from fsci.plot.magnify import magnified
 from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import is_flat
 from fsci.running.output import Series
@@ -38,18 +39,20 @@ class Plane:
 
 @dataclass(frozen=True)
 class Mirror:
-    """Planes of symmetry, and the folder into which whole parts are written."""
+    """Planes of symmetry, and the folder into which whole parts are written; displacements are drawn times `factor`."""
 
     planes: Sequence[Plane]
     folder: Path
+    factor: float = 1.0
 
     def whole(self, parts: Sequence[Series]) -> list[Series]:
         """The VTU files of all parts with their reflections; raises ValueError if a part is on both sides of a plane.
 
         Surfaces of rigid bodies and obstacles may be: what of them is on the side that was computed counts.
         """
+        parts = magnified(parts, self.factor, self.folder)
         if not self.planes or not parts:
-            return list(parts)
+            return parts
         meshes = [import_pyvista().read(series[0][1]) for series in parts]
         sides = [computed_side(meshes, plane) for plane in self.planes]
         return [self._whole(series, sides) for series in parts]

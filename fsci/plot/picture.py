@@ -16,7 +16,7 @@ from fsci.plot.frames import Moment
 from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
-from fsci.plot.render_flow import is_flat, is_flow, load_meshes, load_state
+from fsci.plot.render_flow import is_dry, is_flat, is_flow, load_meshes, load_state
 from fsci.plot.scene import compose, draw
 from fsci.plot.storyboard import choose, plot_story
 from fsci.plot.units import unit_of
@@ -48,6 +48,7 @@ def plot_run(
     movie: bool = False,
     field: str | None = None,
     times: Sequence[float] = (),
+    scale: float = 1.0,
     mirrors: Sequence[str] = (),
     lines: Sequence[str] = (),
     surfaces: Sequence[str] = (),
@@ -56,14 +57,17 @@ def plot_run(
 
     `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
     displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. With `times` only the
-    states nearest to them are drawn. `mirrors` are planes of symmetry such as y=0, of which one side was computed: both
-    are drawn. With `lines`, such as 0,0.2:2.5,0.2, or `surfaces` of bodies only fields along them are written as tables
-    and drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
+    states nearest to them are drawn, without a flow displacements times `scale`. `mirrors` are planes of symmetry such
+    as y=0, of which one side was computed: both are drawn. With `lines`, such as 0,0.2:2.5,0.2, or `surfaces` of bodies
+    only fields along them are written as tables and drawn. Returns the files; raises ValueError if no body has the
+    field, or a body is on both sides of a plane, or what is along lines or beside a flow has a scale.
     """
     require_own(out)
+    if scale != 1.0 and (lines or surfaces):
+        raise ValueError("fields along lines and surfaces have no scale: leave --scale out")
     planes = [read_plane(text) for text in mirrors]
     with tempfile.TemporaryDirectory() as folder:
-        mirror = Mirror(planes, Path(folder))
+        mirror = Mirror(planes, Path(folder), scale)
         if lines or surfaces:
             drawn = _along(Path(out), field, times, mirror, lines, surfaces)
         else:
@@ -100,6 +104,8 @@ def chosen_moments(out: Path, mirror: Mirror, times: Sequence[float]) -> list[Mo
 
 def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mirror: Mirror) -> list[Path]:
     labels = read_labels(out)
+    if mirror.factor != 1.0:
+        labels = replace(labels, title=f"{labels.title}, displacements times {mirror.factor:g}")
     folder = out / "pictures"
     make_folder(folder)
     moments: list[Moment] = list(zip(*read_series(out / "fields", mirror), strict=False))
@@ -169,13 +175,13 @@ def at_rest(moment: Moment, name: str) -> bool:
 
 
 def read_series(folder: Path, mirror: Mirror) -> list[Series]:
-    """The files of all whole parts; those of a flow come first, so that bodies are drawn on top of it."""
+    """The files of all whole parts: a flow, dry sides, then bodies, which are drawn on top of what is before them."""
     packed = folder / VTKHDF_FILE
     if packed.is_file():
         parts = unpack(packed, Path(tempfile.mkdtemp(dir=mirror.folder)))
     else:
         parts = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
-    return sorted(mirror.whole(parts), key=lambda series: not is_flow(series[-1][1]))
+    return sorted(mirror.whole(parts), key=lambda series: (not is_flow(series[-1][1]), not is_dry(series[-1][1])))
 
 
 def plot_state(path: Path, moment: Moment, name: str, labels: Labels) -> Path:

@@ -21,6 +21,7 @@ SUBDIVISION = 3  #: times the faces of second-order cells are halved to look cur
 EDGES_UP_TO = 20_000  #: faces of a body; beyond that its element edges would cover everything
 SUPERSAMPLING = 2  #: pixels rendered per pixel shown, along each side
 BARE = "lightgray"  #: colour of bodies that do not have the field
+DRY = "whitesmoke"  #: colour of the dry side of a surface
 ISOMETRIC = np.array([1.0, -1.0, 0.8]) / np.sqrt(2.64)  #: from the bodies to the camera
 #: VTK type of a face -> its corners; second-order edges have a midnode.
 CORNERS_OF_FACE = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4}
@@ -42,6 +43,7 @@ class DrawnBody:
     opacity: float = 1.0  #: of the surface
     rigid: bool = False  #: no field colours it
     aside: bool = False  #: an obstacle, which may be much larger than what is shown
+    colour: str = BARE  #: where it has no values
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ def render(
         if flat:  # a later body covers an earlier one
             surface = surface.translate(2 * index * lift, inplace=False)
         if body.values is None:
-            plotter.add_mesh(surface, color=BARE, **shading)
+            plotter.add_mesh(surface, color=body.colour, **shading)
         else:
             surface.point_data["colour"] = body.values
             plotter.add_mesh(surface, scalars="colour", clim=limits, cmap=colours, show_scalar_bar=False, **shading)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.plot.derived import component_of, with_derived
-from fsci.plot.render import ISOMETRIC, Array, DrawnBody, import_pyvista, is_obstacle, load_body
+from fsci.plot.render import BARE, DRY, ISOMETRIC, Array, DrawnBody, import_pyvista, is_obstacle, load_body
 
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
@@ -31,6 +31,11 @@ NO_LINES = np.empty((0, 2, 3))
 def is_flow(path: Path) -> bool:
     """Whether a VTU file is that of a flow."""
     return "fluid_fraction" in import_pyvista().read(path).cell_data
+
+
+def is_dry(path: Path) -> bool:
+    """Whether a VTU file is the line around a dry side."""
+    return "dry" in import_pyvista().read(path).cell_data
 
 
 def load_state(files: Sequence[Path], field: str, *, lines: bool = True) -> list[DrawnBody]:
@@ -126,7 +131,8 @@ def _load_body(mesh: Any, field: str) -> list[DrawnBody]:
     """The surface of a rigid body, or an elastic body."""
     if set(np.unique(mesh.celltypes)) == {LINE}:
         filled = fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:])
-        return [replace(filled, rigid=True, aside=is_obstacle(mesh))]
+        colour = DRY if "dry" in mesh.cell_data else BARE
+        return [replace(filled, rigid=True, aside=is_obstacle(mesh), colour=colour)]
     if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not is_flat(mesh):
         surface = mesh.extract_surface(algorithm="dataset_surface")
         return [DrawnBody(surface, NO_LINES, NO_LINES, None, rigid=True, aside=is_obstacle(mesh))]

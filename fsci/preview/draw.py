@@ -23,9 +23,10 @@ MANY_LINES = 400  #: of the grid along an axis, from which they are left out: th
 MANY_NAMES = 15  #: bodies, from which the legend alone has their names
 MANY_ENTRIES = 40  #: of the legend
 FILLED = {"elastic": 0.55, "free": 0.55, "moved": 0.35, "rigid": 0.25, "obstacle": 0.25}  #: kind -> opacity
-MARK_COLOURS = {"support": "black", "spring": "dimgray", "traction": "#d55e00", "pressure": "#cc79a7"}
-PATCHES = {"no slip": "black", "velocity": "#0072b2", "outflow": "#009e73", "periodic": "#e69f00"}
-OTHER_PATCH = "#56b4e9"
+# Bodies have COLOURS; what is no body has others.
+MARK_COLOURS = {"support": "black", "spring": "dimgray", "traction": "#8b2500", "pressure": "#8b3a8b"}
+PATCHES = {"no slip": "black", "velocity": "#00207f", "outflow": "#5f7f1f", "periodic": "#7f5f1f"}
+OTHER_PATCH = "#7f7f7f"
 NEAR = "#cc0000"  #: of the line between the surfaces of a pair
 
 Entry = tuple[Any, str, str]  #: colour, words, marker of a point or line; empty: a surface
@@ -87,7 +88,8 @@ def closest(pairs: list[DistantPair]) -> list[DistantPair]:
 def words_of(pair: DistantPair, unit: str) -> str:
     """Its surfaces and how far they are apart."""
     slave, master = pair.sides
-    return f"{pair.name}: {slave.name}, {master.name}, {pair.distance:.4g} {unit} apart"
+    apart = f"{pair.distance:.4g} {unit} apart" if pair.distance > 0.0 else "touching"
+    return f"{pair.name}: {slave.name}, {master.name}, {apart}"
 
 
 def _add_legend(figure: Any, scene: Preview, unit: str) -> None:

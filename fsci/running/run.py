@@ -418,8 +418,8 @@ class Run:
             found = f"{result['value']:.6g}, {kind} {result['reference']:.6g} +- {result['tolerance']:.2g}"
             self.monitor.say(f"verify {word} {result['name']}: {found} {result['message']}".rstrip())
         coarse = worst_by_body(self.record.resolution.values())
-        for message in coarse:
-            self.monitor.warn(message)
+        for words in coarse:
+            self.monitor.warn(words)
         missed = any(not result["ok"] for result in results)
         if status == "finished":
             reason = f"{message}; " if message else ""

@@ -143,7 +143,7 @@ def test_check_refuses_a_bad_case(beam, capsys):
 
 def test_schema(capsys):
     assert execute(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out)["title"] == "Case"
+    assert json.loads(capsys.readouterr().out)["title"] == "Case of fsci"
     assert execute(["schema", "--markdown"]) == 0
     assert capsys.readouterr().out.startswith("# Input reference\n")
 
@@ -198,7 +198,15 @@ def test_resume_and_plot(calls, capsys):
         (
             "plot",
             (Path("out"),),
-            {"movie": True, "field": "velocity", "times": [0.5, 1.0], "mirrors": [], "lines": [], "surfaces": []},
+            {
+                "movie": True,
+                "field": "velocity",
+                "times": [0.5, 1.0],
+                "scale": 1.0,
+                "mirrors": [],
+                "lines": [],
+                "surfaces": [],
+            },
         ),
     ]
 

@@ -8,6 +8,7 @@ from programs import fsci
 
 from fsci.case import load_case
 from fsci.diff import diff
+from fsci.running.history import HistoryWriter
 from fsci.sweep.picture import draw
 from fsci.sweep.points import Combination, Parameter, between_commas, parameters, points, short_names
 
@@ -147,6 +148,21 @@ def test_pictures_in_a_plane_have_units_per_depth(tmp_path, monkeypatch):
     expected = {"force.x [N/mm]", "end.x [mm]"}
     assert panels["fsci.sweep.picture"] == ["force.x [N/mm]", "end.x [mm]"]
     assert expected <= set(panels["fsci.diff"])
+
+
+def test_diff_shows_forces_of_contact(tmp_path):
+    """Two runs that differ in nothing else."""
+    for name, force in (("one", 2.0), ("two", 3.0)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "case.yaml").write_text(BAR)
+        writer = HistoryWriter(tmp_path / name / "history.csv")
+        for step in (1, 2):
+            columns = {"contact.press.x": force * step, "contact.press.y": 0.0, "contact.active": 4.0}
+            writer.write(step, 0.1 * step, 0.1, 3, 0.0, columns)
+    lines = diff([tmp_path / "one", tmp_path / "two"], tmp_path / "pictures")
+    assert ["contact.press.x", "4", "6", "+33.3", "%", "33.3", "%"] in words("\n".join(lines))
+    assert not any("contact.active" in line for line in lines)
+    assert (tmp_path / "pictures" / "diff_contact.press.png").stat().st_size > 10_000
 
 
 def test_diff_of_the_same_case_and_of_no_results(tmp_path):

@@ -131,6 +131,11 @@ def test_nearest_points_of_surfaces(dim):
         assert ends[0, 0] < ends[1, 0]
 
 
+def test_surfaces_that_touch_but_for_rounding_touch(tmp_path):
+    scene = preview_of(written(tmp_path, SPACE.replace("0.52]", "0.50000000000000011]")))
+    assert "pair blocks: high.bottom, low.top, touching" in [text for _, text, _ in entries(scene, "m")]
+
+
 def test_one_line_for_two_bodies(tmp_path):
     """Of pairs of the same bodies the nearest one is drawn."""
     more = "blocks: {slave: {body: high, on: bottom}, master: {body: low, on: top}}"

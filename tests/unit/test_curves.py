@@ -163,6 +163,10 @@ def test_message(case, old, new, message):
     [
         ("t, v\n0, 1\n", "'../data/inflow.csv' has 1 points, at least 2 are needed"),
         ("0, 1\n1, 2, 3\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2, 3'"),
+        (
+            "0,0;1\n0,5;2\n",
+            "'../data/inflow.csv', line 1: two numbers are expected, not '0,0;1'; decimals have a point",
+        ),
         ("0, 1\n1, nan\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, nan'"),
         ("nan, 0\n0, 1\n1, 1\n", "'../data/inflow.csv', line 1: two numbers are expected, not 'nan, 0'"),
         ("t, v\n0, 1\n\n1, -inf\n2, 1\n", "'../data/inflow.csv', line 4: two numbers are expected, not '1, -inf'"),

@@ -9,8 +9,11 @@ import pytest
 
 from fsci.plot import movie
 from fsci.plot.curves import contact_panels, plot_history
-from fsci.plot.picture import plot_run
-from fsci.plot.render import axes_of_view, frame, load_body, render
+from fsci.plot.magnify import magnified
+from fsci.plot.mirror import Mirror
+from fsci.plot.picture import plot_run, read_series
+from fsci.plot.render import BARE, DRY, axes_of_view, frame, import_pyvista, load_body, render
+from fsci.plot.render_flow import load_state
 from fsci.plot.scene import compose
 from fsci.plot.units import label
 from fsci.running.history import HistoryWriter
@@ -159,6 +162,40 @@ def test_a_run_is_drawn_from_its_folder(tmp_path, monkeypatch):
         assert coloured == (path.name != "mesh.png"), "something coloured is there"
 
 
+def test_displacements_times_a_factor(tmp_path):
+    """Twice the displacement of a bent beam, points and title; true scale beside a flow and along lines."""
+    beam = bent_beam(0.01)
+    write_vtu(tmp_path / "flag.vtu", beam)
+    (((time, file),),) = magnified([[(0.5, tmp_path / "flag.vtu")]], 3.0, tmp_path)
+    assert (time, file.name) == (0.5, "flag.vtu")
+    drawn = import_pyvista().read(file)
+    assert np.allclose(drawn.points, beam.points + 2.0 * beam.point_data["displacement"], rtol=0, atol=1e-6)
+    flow = Snapshot("flow", beam.points, beam.cells, "quad9", {}, {"fluid_fraction": np.ones(len(beam.cells))})
+    write_vtu(tmp_path / "flow.vtu", flow)
+    with pytest.raises(ValueError, match="beside a flow are drawn at true scale: leave --scale out"):
+        magnified([[(0.5, tmp_path / "flow.vtu")]], 3.0, tmp_path)
+    with pytest.raises(ValueError, match="along lines and surfaces have no scale: leave --scale out"):
+        plot_run(tmp_path, scale=2.0, lines=["0,0:1,0"])
+
+
+def test_a_dry_side_is_pale_and_under_the_bodies(tmp_path):
+    """Lines around a dry side, and an obstacle on it."""
+    lines = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+    around = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    fields = FieldWriter(tmp_path / "fields")
+    obstacle = Snapshot("a", 0.25 + 0.5 * around, lines, "line", {})
+    for step in range(2):
+        fields.write(step, 0.1 * step, [Snapshot("side", around, lines, "line", {}, {"dry": np.ones(4)}), obstacle])
+    side, above = read_series(tmp_path / "fields", Mirror([], tmp_path))
+    assert (side[0][1].name, above[0][1].name) == ("side_000000.vtu", "a_000000.vtu")
+    parts = load_state([side[0][1], above[0][1]], "displacement")
+    assert [part.colour for part in parts] == [DRY, BARE]
+    view = frame(np.eye(3), np.zeros(3), np.array([1.0, 1.0, 0.0]), aspect=1.0)
+    pixels = render(parts, view, size=(108, 108), limits=(0.0, 1.0), colours="gray")
+    assert (pixels[54, 54] < 220).all()
+    assert (pixels[54, 12] > 235).all()
+
+
 def test_states_at_times(tmp_path):
     fields = FieldWriter(tmp_path / "fields")
     for step in range(3):
@@ -173,11 +210,14 @@ def test_balances_and_contact_are_a_picture_each(tmp_path):
     time = np.linspace(0, 1, 40)
     history = {"time": time, "structure.energy": -1e-6 * time, "fluid.mass": 0 * time, "contact.active": np.round(time)}
     history |= {f"contact.wall.{axis}": time for axis in "xyz"}
+    history |= {"contact.friction": 2.0 * time, "contact.on_ball.x": time}
     drawn = plot_history(tmp_path, history, {}, SI)
     assert [path.name for path in drawn] == ["history_contact.png", "history_balances.png"]
     panels = contact_panels(history, SI)
     assert {label: list(curves) for label, curves in panels.items()} == {
         "contact force of wall [N]": ["x", "y", "z"],
+        "work of friction [J]": [""],
+        "contact force on ball [N]": ["x"],
         "contact nodes": ["active"],
     }
 
