@@ -100,8 +100,10 @@ def _read_csv(folder: Path, name: str) -> Array:
         return points
     for number, line in rows:
         if _numbers(line) is None:
-            point = "; decimals have a point" if re.search(r"\d,\d+\s*;", line) else ""
-            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'{point}", "csv")
+            decimals = re.search(r"\d,\d+\s*;", line)
+            more = len(_words(line)) > 2 and all(map(_is_number, _words(line)))
+            hint = "; decimals have a point" if decimals else "; a file has a time and one value in a line" * more
+            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'{hint}", "csv")
     return np.array([_numbers(line) for _, line in rows])
 
 

@@ -24,7 +24,13 @@ MANY_NAMES = 15  #: bodies, from which the legend alone has their names
 MANY_ENTRIES = 40  #: of the legend
 FILLED = {"elastic": 0.55, "free": 0.55, "moved": 0.35, "rigid": 0.25, "obstacle": 0.25}  #: kind -> opacity
 # Bodies have COLOURS; what is no body has others.
-MARK_COLOURS = {"support": "black", "spring": "dimgray", "traction": "#8b2500", "pressure": "#8b3a8b"}
+MARK_COLOURS = {
+    "support": "black",
+    "spring": "dimgray",
+    "traction": "#8b2500",
+    "pressure": "#8b3a8b",
+    "force": "#8b2500",
+}
 PATCHES = {"no slip": "black", "velocity": "#00207f", "outflow": "#5f7f1f", "periodic": "#7f5f1f"}
 OTHER_PATCH = "#7f7f7f"
 NEAR = "#cc0000"  #: of the line between the surfaces of a pair
@@ -67,6 +73,8 @@ def entries(scene: Preview, unit: str) -> Iterator[Entry]:
         yield colour, f"{part.name} ({part.kind})", ""
     for part in scene.marks:
         yield MARK_COLOURS[part.kind], f"{part.kind} on {part.name}", ""
+    for point in scene.points:
+        yield MARK_COLOURS[point.kind], f"{point.kind} at a point of {point.name}", "^"
     for pair in scene.pairs:
         yield NEAR, f"pair {words_of(pair, unit)}", "."
     for part in scene.patches:
@@ -112,7 +120,8 @@ def _add_legend(figure: Any, scene: Preview, unit: str) -> None:
 
 
 def _short(words: str) -> str:
-    return words if len(words) <= 54 else f"{words[:51]}..."
+    """At most 54 characters; what is at the end is what matters of a pair: its distance."""
+    return words if len(words) <= 54 else f"{words[:31]}...{words[-20:]}"
 
 
 # ------------------------------------------------------------------------------------------------------- the plane
@@ -147,6 +156,8 @@ def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mappi
     for pair in closest(scene.pairs):
         axes.add_collection(LineCollection([pair.ends], colors=NEAR, linewidths=1.2, zorder=6))
         axes.plot(*pair.ends.T, ".", color=NEAR, markersize=4, zorder=6)
+    for mark in scene.points:
+        axes.plot(*mark.at, "^", color=MARK_COLOURS[mark.kind], markersize=8, zorder=7)
     for point in scene.probes.values():
         axes.plot(*point[:2], "+", color="black", markersize=9, zorder=7)
     margin = 0.03 * (high - low).max()
@@ -220,6 +231,8 @@ def _draw_space(figure: Any, scene: Preview, low: Array, high: Array) -> None:
         plotter.add_mesh(pyvista.Line(*pair.ends), color=NEAR, line_width=5)
     if scene.box is not None:
         plotter.add_mesh(pyvista.Box(np.column_stack(scene.box).ravel()).outline(), color="black", line_width=2)
+    for point in scene.points:
+        plotter.add_mesh(import_pyvista().PolyData(point.at[None]), color=MARK_COLOURS[point.kind], point_size=14)
     if scene.probes:
         plotter.add_mesh(pyvista.PolyData(np.array(list(scene.probes.values()))), color="black", point_size=14)
     if len(scene.bodies) < MANY_NAMES:

@@ -135,10 +135,11 @@ def _parts(scene: Preview, unit: str) -> Iterator[dict[str, Any]]:
         yield {**_part(pair.name, NEAR, pair.ends, lines, width=3, words=f"pair {words_of(pair, unit)}"), "top": True}
     size = 0.01 * float(np.ptp(np.concatenate([part.corners.reshape(-1, part.corners.shape[2])
                                                for part in scene.bodies + scene.patches]), axis=0).max())  # fmt: skip
-    for name, point in scene.probes.items():
-        x = _in_space(point[None])
-        cross = np.concatenate([x + size * sign * np.eye(3) for sign in (-1, 1)])
-        yield {**_part(name, "black", cross, [[0, 3], [1, 4], [2, 5]], width=2, words=f"probe {name}"), "top": True}
+    points = [(p.name, MARK_COLOURS[p.kind], p.at, f"{p.kind} at a point of {p.name}") for p in scene.points]
+    points += [(name, "black", point, f"probe {name}") for name, point in scene.probes.items()]
+    for name, colour, point, words in points:
+        cross = np.concatenate([_in_space(point[None]) + size * sign * np.eye(3) for sign in (-1, 1)])
+        yield {**_part(name, colour, cross, [[0, 3], [1, 4], [2, 5]], width=2, words=words), "top": True}
 
 
 def _surface(part: NamedSurface, colour: str, opacity: float, words: str, *, lines: bool = False) -> dict[str, Any]:

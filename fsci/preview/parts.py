@@ -39,6 +39,15 @@ class NamedSurface:
 
 
 @dataclass(frozen=True)
+class NamedPoint:
+    """A point of a body with a support, a spring or a force."""
+
+    name: str
+    kind: str  #: support, spring or force
+    at: Array  #: [m], shape (dim,)
+
+
+@dataclass(frozen=True)
 class DistantPair:
     """Two surfaces in contact, and where they are nearest."""
 
@@ -63,6 +72,7 @@ class Preview:
     patches: list[NamedSurface]
     pairs: list[DistantPair]
     probes: dict[str, Array]
+    points: list[NamedPoint]  #: that are held, or that springs and forces act at
     box: tuple[Array, Array] | None = None
     planes: tuple[Array, ...] = ()  #: of the grid, along each axis
     cells: list[Array] = field(default_factory=list)  #: (low, high) corners of nested cells
@@ -76,8 +86,9 @@ def preview_of(case: Case) -> Preview:
     bodies = list(_bodies(case))
     probes = {name: np.asarray(probe.at) for name, probe in case.probes.items() if probe.at is not None}
     pairs = [pair for name, settings in found.pairs.items() if (pair := _pair(case, name, settings)) is not None]
+    points = [*_points_of_elastic(case), *_points_of_free(case)]
     if case.fluid is None:
-        return Preview(case.title, bodies, list(_marks(case)), [], pairs, probes)
+        return Preview(case.title, bodies, list(_marks(case)), [], pairs, probes, points)
     section = case.fluid.grid
     low, high = np.asarray(section.start, dtype=float), np.asarray(section.to, dtype=float)
     patches = [
@@ -86,7 +97,7 @@ def preview_of(case: Case) -> Preview:
     ]
     planes = tuple(np.asarray(edge) for edge in section.planes)
     cells = list(_nested_cells(case)) if section.refine else []
-    return Preview(case.title, bodies, list(_marks(case)), patches, pairs, probes, (low, high), planes, cells)
+    return Preview(case.title, bodies, list(_marks(case)), patches, pairs, probes, points, (low, high), planes, cells)
 
 
 def _bodies(case: Case) -> Iterator[NamedSurface]:
@@ -118,6 +129,24 @@ def _marks(case: Case) -> Iterator[NamedSurface]:
                 on = [surface for surface in item.on or () if surface in mesh.surfaces]
                 if on:
                     yield _surface(mesh, on, f"{name}.{' + '.join(on)}", kind)
+
+
+def _points_of_elastic(case: Case) -> Iterator[NamedPoint]:
+    """Supports at points of elastic bodies."""
+    for name, body in case.elastic_bodies.items():
+        for support in body.supports:
+            if support.at is not None:
+                yield NamedPoint(name, "support", np.asarray(support.at))
+
+
+def _points_of_free(case: Case) -> Iterator[NamedPoint]:
+    """Points of free rigid bodies that springs and forces act at."""
+    for name, free in (case.rigid or {}).items():
+        for spring in free.springs:
+            yield NamedPoint(name, "spring", np.asarray(spring.at))
+        for load in free.loads:
+            if load.at is not None:
+                yield NamedPoint(name, "force", np.asarray(load.at))
 
 
 def _pair(case: Case, name: str, settings: PairSection) -> DistantPair | None:

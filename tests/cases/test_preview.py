@@ -131,6 +131,23 @@ def test_nearest_points_of_surfaces(dim):
         assert ends[0, 0] < ends[1, 0]
 
 
+def test_points_that_are_held_or_loaded(tmp_path):
+    free = (
+        "free: {density: 2, springs: [{at: [1.7, 0.4], stiffness: [1, 1]}], loads: [{force: [1, 0], at: [1.7, 0.2]}]}"
+    )
+    held = "[{on: inner, displacement: [0, 0]}, {at: [0.7, 0.5], displacement: [0, null]}]"
+    text = PLANE.replace("free: {density: 2}", free).replace("[{on: inner, displacement: [0, 0]}]", held)
+    scene = preview_of(written(tmp_path, text))
+    assert [(point.name, point.kind, *point.at) for point in scene.points] == [
+        ("block", "support", 0.7, 0.5), ("loose", "spring", 1.7, 0.4), ("loose", "force", 1.7, 0.2),
+    ]  # fmt: skip
+    words = [text for _, text, _ in entries(scene, "m")]
+    assert {"support at a point of block", "spring at a point of loose", "force at a point of loose"} <= set(words)
+    assert fsci("preview", tmp_path, "-o", tmp_path / "all.png").returncode == 0
+    assert fsci("preview", tmp_path, "-o", tmp_path / "all.html").returncode == 0
+    assert "force at a point of loose" in (tmp_path / "all.html").read_text()
+
+
 def test_surfaces_that_touch_but_for_rounding_touch(tmp_path):
     scene = preview_of(written(tmp_path, SPACE.replace("0.52]", "0.50000000000000011]")))
     assert "pair blocks: high.bottom, low.top, touching" in [text for _, text, _ in entries(scene, "m")]

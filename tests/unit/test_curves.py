@@ -162,7 +162,11 @@ def test_message(case, old, new, message):
     ("text", "message"),
     [
         ("t, v\n0, 1\n", "'../data/inflow.csv' has 1 points, at least 2 are needed"),
-        ("0, 1\n1, 2, 3\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2, 3'"),
+        (
+            "0, 1\n1, 2, 3\n",
+            "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2, 3'; "
+            "a file has a time and one value in a line",
+        ),
         (
             "0,0;1\n0,5;2\n",
             "'../data/inflow.csv', line 1: two numbers are expected, not '0,0;1'; decimals have a point",
@@ -171,7 +175,11 @@ def test_message(case, old, new, message):
         ("nan, 0\n0, 1\n1, 1\n", "'../data/inflow.csv', line 1: two numbers are expected, not 'nan, 0'"),
         ("t, v\n0, 1\n\n1, -inf\n2, 1\n", "'../data/inflow.csv', line 4: two numbers are expected, not '1, -inf'"),
         ("0, 1\n1, 1e999\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 1e999'"),
-        ("0, 1, 2\n1, 2\n2, 3\n", "'../data/inflow.csv', line 1: two numbers are expected, not '0, 1, 2'"),
+        (
+            "0, 1, 2\n1, 2\n2, 3\n",
+            "'../data/inflow.csv', line 1: two numbers are expected, not '0, 1, 2'; "
+            "a file has a time and one value in a line",
+        ),
         ("0, 1\n1, 2 # end\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2 # end'"),
         ("0 1\n2 1\n1 3\n", "'../data/inflow.csv' must have increasing times, not go from 2 to 1"),
     ],

@@ -1,5 +1,6 @@
 """Meshes of a case: gmsh scripts and files, other formats, names, regions, placing."""
 
+import re
 import signal
 from math import asin, pi, sqrt
 from pathlib import Path
@@ -329,6 +330,10 @@ def test_files_that_are_no_mesh(tmp_path):
     (tmp_path / "text.vtu").write_text("hello")
     with pytest.raises(MeshError, match=r"text.vtu: meshio says: .*Couldn't read file"):
         build(tmp_path, "text.vtu")
+    (tmp_path / "part.step").write_text("ISO-10303-21;")
+    words = 'part.step: this is a geometry without a mesh; name a file .geo with the lines SetFactory("OpenCASCADE"); '
+    with pytest.raises(MeshError, match=re.escape(f'{words}Merge "part.step"; MeshSize {{:}} = 0.1;')):
+        build(tmp_path, "part.step")
     (tmp_path / "text.msh").write_text("hello")
     with pytest.raises(MeshError, match=r"text.msh: gmsh says: .*syntax error"):
         build(tmp_path, "text.msh")
