@@ -130,5 +130,5 @@ links: docs
 
 # Back to a fresh clone, except for results/: they may have taken days.
 clean:
-	rm -rf .venv build docs/_build docs/reference .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build docs/_build docs/reference/{api,constants}.md docs/reference/fsci.schema.json .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +

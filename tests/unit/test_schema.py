@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 from ruamel.yaml import YAML
 
@@ -43,6 +44,12 @@ def test_lines_of_the_reference():
         "| `halvings` | whole number >= 0 | `4` |  | how many times a step may be halved before the run ends |" in lines
     )
     assert "## `structure.bodies.NAME.mesh` with shape: `tube` or `annulus`" in lines
+
+
+def test_the_reference_in_the_repository_is_that_of_the_settings():
+    """`make docs` writes it."""
+    written = (Path(__file__).parents[2] / "docs" / "reference" / "case.md").read_text()
+    assert written == reference_markdown() + "\n"
 
 
 def test_links_of_the_reference_lead_somewhere():
