@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +42,8 @@ def build_sentinels(
     given: list[ImmersedBody] | None = None,
 ) -> dict[str, Sentinel]:
     """Those that the case needs (collective); given: rigid bodies in the flow that it does not move."""
-    elastic = [] if structure is None else list(_elastic(structure))
+    wetted = {} if case.coupling is None else case.coupling.wetted
+    elastic = [] if structure is None else list(_elastic(structure, wetted))
     bodies = [*elastic, *([] if rigid is None else _free(rigid))]
     walls = list(closed_faces(case)) if bodies else []
     rest = [*_given(given or []), *_obstacles(case, comm)] if bodies else []
@@ -68,7 +69,8 @@ def build_sentinels(
 # ---------------------------------------------------------------------------------------------------------- bodies
 
 
-def _elastic(structure: Structure) -> Iterator[MovingBody]:
+def _elastic(structure: Structure, wetted: Mapping[str, Sequence[str]]) -> Iterator[MovingBody]:
+    """wetted: names of the surfaces in the fluid, of bodies that are partly in it."""
     from coupling.contact_surfaces import global_dofs
     from solvers.algebra.blocks import Layout
     from solvers.algebra.rows import gather_at
@@ -78,13 +80,14 @@ def _elastic(structure: Structure) -> Iterator[MovingBody]:
     for index, body in enumerate(structure.bodies):
         mesh = body.domain.source
         facets, nodes, points = comm.bcast(None if mesh is None else _surface(mesh), root=0)
+        wet = comm.bcast(None if mesh is None else tessellate(mesh, wetted.get(body.name))[1], root=0)
         dofs = global_dofs(layout, index, body, nodes)
 
         def positions(t: float, points: Array = points, dofs: NDArray[np.int64] = dofs) -> Array:
             return points + gather_at(comm, structure.now.u, structure.layout.start, dofs)
 
         pieces = CELL_TYPES[body.domain.cell_type].degree
-        yield MovingBody(body.name, facets, positions, free=True, pieces=pieces)
+        yield MovingBody(body.name, facets, positions, free=True, pieces=pieces, dry=~np.isin(nodes, wet))
 
 
 def _surface(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:

@@ -34,7 +34,7 @@ class Wall:
 
 
 class BoxWalls:
-    """Looks for vertices of elastic and free bodies behind faces that hold the fluid.
+    """Looks for vertices of elastic and free bodies, in the fluid, behind faces that hold it.
 
     A body that reaches through a face at the start may do so all the time. Contact with an obstacle at the wall lets
     vertices pass by the height of the arcs that facets replace, edges included.
@@ -66,7 +66,7 @@ class BoxWalls:
             heights = arc_height(measures.edge, measures.bends[0] + measures.bends[1])
             self._tolerance.append(rounding + _at_vertices(heights, body.facets, len(x)))
             self._edge.append(_at_vertices(measures.edge, body.facets, len(x)))
-            self._allowed.append([bool((wall.depth(x) > rounding).any()) for wall in self._walls])
+            self._allowed.append([bool((_depth(body, wall, x) > rounding).any()) for wall in self._walls])
             self._within.append(self._meets_box(x))
 
     def _meets_box(self, x: Array) -> bool:
@@ -89,7 +89,7 @@ class BoxWalls:
 
     def _through(self, k: int, number: int, x: Array) -> Finding | None:
         wall, name = self._walls[number], self._bodies[k].name
-        depth = wall.depth(x)
+        depth = _depth(self._bodies[k], wall, x)
         wrong = depth > self._tolerance[k]
         if self._allowed[k][number] or not wrong.any():
             return None
@@ -107,6 +107,12 @@ class BoxWalls:
 
     def restore(self, state: State) -> None:
         """It keeps nothing from step to step."""
+
+
+def _depth(body: MovingBody, wall: Wall, x: Array) -> Array:
+    """How far the vertices of a body are behind a wall [m], zero of those without fluid."""
+    depth = wall.depth(x)
+    return depth if body.dry is None else np.where(body.dry, 0.0, depth)
 
 
 def _at_vertices(values: Array, facets: NDArray[np.int64], count: int) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_sentinel_overlaps import block, circle, moving, ring_facets
@@ -53,6 +55,15 @@ def test_a_hole_in_the_wall():
     body = moving("a", points, facets, [(0.0, 1.0), (0.0, -0.5)])
     for within, seen in ((lambda x: x[0] > 1.5, False), (lambda x: x[0] > 0.5, True)):
         assert bool(watch([body], [Wall("w", "y-", 0.0, within)]).look(1.0, 1.0)) == seen
+
+
+def test_vertices_without_fluid_may_pass():
+    """A face of the box holds fluid, and the bodies in it."""
+    points, facets = block(2, cells=10)
+    low = np.isclose(points[:, 1], points[:, 1].min())
+    body = moving("a", points, facets, [(0.0, 1.0), (0.0, -0.5)])
+    for dry, seen in ((low, True), (points[:, 1] < 0.7, False)):
+        assert bool(watch([replace(body, dry=dry)]).look(1.0, 1.0)) == seen
 
 
 def test_a_body_that_stands_on_the_wall_and_sinks():
