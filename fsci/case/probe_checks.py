@@ -96,7 +96,7 @@ def _of_structure(structure: StructureSection, name: str, probe: Probe) -> Itera
 
 def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, grid = ("probes", name), fluid.grid
-    bodies = [*fluid.bodies, *(case.elastic_bodies if case.coupling is not None else ())]
+    bodies = [*fluid.bodies, *case.elastic_bodies]
     if "body" not in probe.measured.needs:
         if probe.body is not None:
             yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not measured on a body"

@@ -35,6 +35,7 @@ OF_KIND: dict[FailureKind, tuple[str, ...]] = {
     FailureKind.INVERTED: (
         f"{SHORTER}: the load or the motion of a step is too large for the elements",
         "a finer mesh, or rounder corners, where the element is",
+        "loads and E in the units of the case: 1 MPa is 1e6 Pa",
     ),
     FailureKind.LINEAR_SOLVER: ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
     FailureKind.MOTION: (

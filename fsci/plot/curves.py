@@ -108,10 +108,10 @@ def plot_history(
 
 
 def scaled(
-    curves: Mapping[str, Any], quantity: str, units: Mapping[str, str], *, flat: bool
+    curves: Mapping[str, Any], quantity: str, units: Mapping[str, str], *, flat: bool, beside: Sequence[Any] = ()
 ) -> tuple[Unit, dict[str, Any]]:
-    """The unit of curves by the largest of their values, and the curves in it."""
-    sizes = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in curves.values()]
+    """The unit of curves by the largest value of them and of those `beside` them, and the curves in it."""
+    sizes = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in (*curves.values(), *beside)]
     unit = unit_of(quantity, units, float(max(sizes)), flat=flat)
     return unit, {name: values * unit.factor for name, values in curves.items()}
 
@@ -133,8 +133,9 @@ def contact_panels(history: History, units: Mapping[str, str], *, flat: bool = F
         else:
             panels.setdefault((NODES, ""), {})[number] = values
     found = {}
+    forces = [curve for (_, quantity), curves in panels.items() if quantity == "force" for curve in curves.values()]
     for (text, quantity), curves in sorted(panels.items(), key=lambda panel: panel[0][0] == NODES):
-        unit, curves = scaled(curves, quantity, units, flat=flat)
+        unit, curves = scaled(curves, quantity, units, flat=flat, beside=forces if quantity == "force" else ())
         found[unit.beside(text)] = curves
     return found
 

@@ -43,6 +43,8 @@ def plot_lines(
                 number = names.index(name)
                 style: Any = {"color": COLOURS[number % len(COLOURS)], "label": literal(name)}
                 style["linestyle"] = DASHES[number // len(COLOURS) % len(DASHES)]
+                # the first lines are wider: those that lie on them are seen to do so
+                style["linewidth"] = CURVE_STYLE["lines.linewidth"] * (1 + max(0, min(len(names), 3) - 1 - number))
                 axes.plot(positions, values, marker="o" if np.size(positions) < MARKED else "", **style)
             axes.set_title(title, loc="left", fontsize=CURVE_STYLE["font.size"])
         if len(names) > 1:

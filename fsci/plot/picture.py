@@ -206,10 +206,14 @@ def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
     loaded = [load_body(file, CONTACT_PRESSURE) for time, file in moment if largest_pressure(((time, file),)) > 0]
     # between the nodes of second-order cells the interpolated pressure may be negative
     bodies = [replace(body, values=np.maximum(body.values, 0.0)) for body in loaded if body.values is not None]
+    others = [file for _, file in moment if not (is_flow(file) or is_dry(file))]
+    flat = is_flat(bodies[0].surface)  # in space what touches a body would hide it
+    rigid = [part for file in others for part in load_state([file], CONTACT_PRESSURE) if part.rigid] if flat else []
     towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
     away = look_at(-towards)
-    scene = compose([bodies], CONTACT_PRESSURE, labels.title, labels.units, away=away, colours="Reds")
-    save_figure(draw(scene, bodies, moment[0][0], dots=CURVE_DOTS), path)
+    parts = [*(replace(part, aside=True) for part in rigid), *bodies]
+    scene = compose([parts], CONTACT_PRESSURE, labels.title, labels.units, away=away, colours="Reds")
+    save_figure(draw(scene, parts, moment[0][0], dots=CURVE_DOTS), path)
     return path
 
 

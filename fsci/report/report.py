@@ -89,9 +89,9 @@ def _resolution(summary: Mapping[str, Any]) -> str:
             ("coarse", "bad") if found["warns"] else ("ok", "ok"),
             found["body"],
             found["to"] or "",
-            _number(found["cells"]) if found["cells"] is not None else "no shear",
-            _number(found["least"]),
-            _number(found["error"]),
+            f"{found['cells']:.3g}" if found["cells"] is not None else "no shear",
+            f"{found['least']:.3g}",
+            f"{found['error']:.2g}",
             found["message"],
         )
         for found in summary.get("resolution", ())

@@ -210,7 +210,7 @@ def test_balances_and_contact_are_a_picture_each(tmp_path):
     time = np.linspace(0, 1, 40)
     history = {"time": time, "structure.energy": -1e-6 * time, "fluid.mass": 0 * time, "contact.active": np.round(time)}
     history |= {f"contact.wall.{axis}": time for axis in "xyz"}
-    history |= {"contact.friction": 2.0 * time, "contact.on_ball.x": time}
+    history |= {"contact.friction": 2.0 * time, "contact.on_ball.x": 1e-4 * time}
     drawn = plot_history(tmp_path, history, {}, SI)
     assert [path.name for path in drawn] == ["history_contact.png", "history_balances.png"]
     panels = contact_panels(history, SI)

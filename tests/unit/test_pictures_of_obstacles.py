@@ -7,7 +7,7 @@ import pytest
 from case_mistakes import load
 
 from fsci.builder.obstacles import obstacle_snapshots
-from fsci.plot.picture import largest_pressure, plot_run
+from fsci.plot.picture import Labels, largest_pressure, plot_pressure, plot_run
 from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import load_state
 from fsci.plot.scene import AROUND, compose
@@ -80,6 +80,20 @@ def test_the_largest_contact_pressure_and_its_time(tmp_path, monkeypatch):
     assert "final_contact_pressure.png" in [path.name for path in plot_run(tmp_path)]
     assert titles == [f"{tmp_path.name}, largest 2.5 kPa at 0.25 s"]
     assert largest_pressure(((0.0, tmp_path / "fields/floor_000001.vtu"),)) == 0.0
+
+
+def test_contact_pressure_is_drawn_beside_what_presses(tmp_path, monkeypatch):
+    """In the plane; what touches a body in space would hide it."""
+    drawn = []
+    monkeypatch.setattr("fsci.plot.picture.compose", lambda states, *rest, **more: drawn.extend(states[0]))
+    monkeypatch.setattr("fsci.plot.picture.draw", lambda *rest, **more: None)
+    monkeypatch.setattr("fsci.plot.picture.save_figure", lambda figure, path: None)
+    files = []
+    for part in (block(2500.0), outline(2.0)):
+        write_vtu(tmp_path / f"{part.name}.vtu", part)
+        files.append((0.0, tmp_path / f"{part.name}.vtu"))
+    plot_pressure(tmp_path / "p.png", tuple(files), Labels("title"))
+    assert [(part.aside, part.values is None) for part in drawn] == [(True, True), (False, False)]
 
 
 @pytest.mark.parametrize(("shift", "half"), [(1.0, 1.0), (0.3, 1.7), (1.7, 0.3), (0.0, 2.0), (-0.5, 2.5)])
