@@ -25,6 +25,7 @@ class ActiveSet:
         self.changed = False  #: whether the latest choice changed the set
         self.changes = 0  #: count of choices in this step that changed the set
         self.alternating = 0  #: nodes whose status changed when an earlier set came back in this step; 0: none did
+        self.returned = np.zeros(size, dtype=bool)  #: mask of all nodes whose status changed so in this solve
         self.wedged = False  #: whether one of them was stuck and slipped in turn
         self.tried = np.zeros(size, dtype=bool)  #: mask of the multipliers that were in contact in this solve
         self.stuck = np.zeros(size, dtype=bool)  #: mask of those whose slip may reverse
@@ -45,6 +46,7 @@ class ActiveSet:
     def begin_solve(self) -> None:
         """Discard the earlier sets, which other loads may have chosen."""
         self.alternating, self.wedged, self._earlier = 0, False, {self.status.tobytes()}
+        self.returned = np.zeros_like(self.returned)
         self._reversals, self._alternates = set(), False
         self.tried, self.stuck = self.active, np.zeros_like(self.stuck)
 
@@ -57,6 +59,7 @@ class ActiveSet:
             chosen = status.tobytes()
             if chosen in self._earlier:
                 self.alternating = different
+                self.returned = self.returned | (status != self.status)
                 self.wedged |= bool((np.minimum(status, self.status)[status != self.status] == SLIP).any())
             self._earlier.add(chosen)
         self.status = status.copy()

@@ -132,9 +132,9 @@ class Contact:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
         self._stiffnesses.begin_step()
-        cycled, self._begun = self._begun and bool(self.cycle()), True
+        cycled, self._begun = self.active_set.returned & self._begun, True
         self.active_set.begin_step()
-        self._integration.begin_step(self.x, self.active_set.active, along_masters=not cycled)
+        self._integration.begin_step(self.x, self.active_set.active, cycled)
         self._condensation = None
         self.slip = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
@@ -187,6 +187,13 @@ class Contact:
         self._integration.interfere(t)
         if self._integration.clear:
             return
+        self._choose()
+        if not self.active_set.changed and self._integration.rims.press(self.active_set.active):
+            self._choose()
+        self._set_multipliers(np.where(self._constrained[:, None], self.z, 0.0))
+
+    def _choose(self) -> None:
+        """Integrate at the present positions, and choose the active set."""
         self.terms = self._integrate()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
         self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self._own_gap(self.terms))
@@ -198,7 +205,6 @@ class Contact:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
-        self._set_multipliers(np.where(self._constrained[:, None], self.z, 0.0))
 
     @property
     def _constrained(self) -> NDArray[np.bool_]:
@@ -459,6 +465,7 @@ class Contact:
             "mean_gap": self._mean_gap.copy(),
             "status": self.active_set.status.copy(),
             "present": self.present.copy(),
+            "straight": self._integration.rims.straight.copy(),
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
             "obstacle_work": self._of_obstacles.save(),
@@ -473,6 +480,8 @@ class Contact:
         self._mean_gap = state["mean_gap"].copy()
         self.active_set.status = state["status"].copy()
         self.present = state["present"].copy()
+        if not self._begun:  # what made a step fail counts when it is taken again
+            self._integration.rims.straight = state["straight"].copy()
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
         self._of_obstacles.restore(state["obstacle_work"])

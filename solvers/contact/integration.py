@@ -54,7 +54,7 @@ class Integration:
         pressed = [
             patch for patch in self._multipliers.patches if any(mortar.patch is patch for mortar in self._mortars)
         ]
-        self._rims = Rims(self._multipliers, interface.nodes.points, pressed)
+        self.rims = Rims(self._multipliers, interface.nodes.points, pressed)
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
@@ -94,16 +94,16 @@ class Integration:
         for mortar in self._mortars:
             mortar.clear_until = -np.inf
 
-    def begin_step(self, x: Array, active: NDArray[np.bool_], *, along_masters: bool) -> None:
-        """Begin a step at the positions x [m], shape (N, dim); active: mask of the multipliers in contact, (C,).
+    def begin_step(self, x: Array, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
+        """Begin a step at the positions x [m], shape (N, dim); masks, shape (C,).
 
-        along_masters: pressure near rims acts along the normals of the masters.
+        active: of the multipliers in contact; cycled: of those by which the step failed that is taken again.
         """
         self.shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(x, active)
         self._sliding.begin_step(x, self._travel)
-        self._rims.begin_step(active & along_masters)
+        self.rims.begin_step(active, cycled)
 
     def move(self, dx: Array) -> None:
         """Note that the nodes have moved by dx [m] since the latest iterate, shape (N, dim)."""
@@ -148,7 +148,7 @@ class Integration:
         pieces += self._ties.pieces if shares.comm.rank == 0 else []
         terms = total_terms(pieces, normals, shares, (len(self._interface.pairs), len(z), len(x)))
         used = tuple((mortar, found.used) for mortar, found in pieces)
-        return Integrals(self._rims.turned(terms, normals, used, x, shares), normals, used)
+        return Integrals(self.rims.turned(terms, normals, used, x, shares), normals, used)
 
     def _near_nodes(self, near: Sequence[NDArray[np.int32]]) -> list[NDArray[np.bool_] | None]:
         """For each patch, mask of the nodes of slave facets that are near; None where a surface is tied."""

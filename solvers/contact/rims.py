@@ -7,10 +7,14 @@ no work where the slave slides up such a rise. Near rims its direction is that o
 
 with the normals n_m of the masters and the area A_j of the node, of which D_j is covered. a_j is the derivative of the
 weighted gap with respect to a translation of the masters. The weight w_j is the mean of D / A, within 0 and 1, over the
-nodes of the rim: no master goes on beyond a rim that none covers. It is zero in the step in which a node is pressed
-first, whose iterates may pass far through the master, and where a step is taken again because its active set cycled,
-as it may with much friction. Rims are those of smooth pieces, sharp edges among them. Cuts by
-planes of symmetry are none: there the surface goes on.
+nodes of the rim: no master goes on beyond a rim that none covers. A node that is pressed in a step gets its direction
+once the active set stays, since earlier iterates may pass far through the master. Rims are those of smooth pieces,
+sharp edges among them. Cuts by planes of symmetry are none: there the surface goes on.
+
+A stiff rim that is dragged over the facets of something soft meets their slopes one by one: the force along the way
+rises and falls, and an equilibrium may end between two facets. Where a step failed because its active set cycled, its
+surface keeps its own normals until it has left contact: directions for single steps would be jumps, which no shorter
+step makes smaller.
 """
 
 from __future__ import annotations
@@ -62,11 +66,25 @@ class Rims:
             self._areas[patch.multipliers] = integrals_of_nodes(points[patch.nodes], patch.facets, patch.facet_type)
         self._rims = add_up(parts, (C, C))  # mean over the nodes of rims near each multiplier
         self._near = np.diff(self._rims.indptr) > 0
-        self._pressed = np.zeros(C, dtype=bool)  # near a rim, and in contact as the step begins
+        self._patches = tuple(patches)
+        self.straight = np.zeros(C, dtype=bool)  #: mask of those that keep their normals
+        self._pressed = np.zeros(C, dtype=bool)  # near a rim, and in contact with a set that has settled
 
-    def begin_step(self, active: NDArray[np.bool_]) -> None:
-        """Begin a step; active: mask of the multipliers in contact, shape (C,)."""
-        self._pressed = self._near & active
+    def begin_step(self, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
+        """Begin a step; masks, shape (C,).
+
+        active: of the multipliers in contact; cycled: of those by which the step failed that is taken again.
+        """
+        for patch in self._patches:
+            mine = patch.multipliers
+            self.straight[mine] = (self.straight[mine] & active[mine].any()) | cycled[mine].any()
+        self._pressed = self._near & active & ~self.straight
+
+    def press(self, active: NDArray[np.bool_]) -> bool:
+        """Add multipliers that have come into contact in this step; returns whether there are any."""
+        new = self._near & active & ~self._pressed & ~self.straight
+        self._pressed = self._pressed | new
+        return bool(new.any())
 
     def turned(
         self,

@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 from mpi4py import MPI
 
-from solvers.api import Array
+from solvers.api import Array, State
 from solvers.structure.body import Body
 
 #: Displacement, relative to the size of the largest body, above which the system was singular.
@@ -76,3 +76,9 @@ class LimitPoint:
             f"; most likely there is no equilibrium beyond t = {self._reached:.4g}: displacements grew ever faster "
             "up to there, as of a structure that snaps or buckles; use dynamics"
         )
+
+    def save(self) -> State:
+        return {"speeds": np.array(self._speeds), "reached": self._reached}
+
+    def restore(self, state: State) -> None:
+        self._speeds, self._reached = state["speeds"].tolist(), float(state["reached"])

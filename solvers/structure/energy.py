@@ -123,7 +123,8 @@ class EnergySentinel:
         return [Finding("energy", "structure", error, f"{what}: {remedy}")]
 
     def save(self) -> State:
-        return {"of_overlap": self._of_overlap}
+        return {"of_overlap": self._of_overlap, "limit_point": self._limit_point.save()}
 
     def restore(self, state: State) -> None:
         self._of_overlap = state["of_overlap"]
+        self._limit_point.restore(state["limit_point"])

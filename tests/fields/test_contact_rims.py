@@ -152,3 +152,93 @@ def test_much_friction(tmp_path):
     text = text.replace("0.16*min(t, 0.25)", "0.2*min(t, 0.25)").replace("coefficient: 0.25", "coefficient: 0.65")
     history = run(text, tmp_path)
     assert history["time"][-1] == 1.0
+
+
+#: A block is pressed into a soft base by a fifth of its height; two cells of the base are in front of its rim.
+PRESSED = """\
+title: pressed
+time: {{step: {0}, end: 1}}
+structure:
+  bodies:
+    base:
+      mesh: {{shape: rectangle, size: [2, 1], cells: [10, 4]}}
+      material: {{law: neo_hooke, E: 1000, nu: 0.3}}
+      supports: [{{on: bottom, displacement: [0, 0]}}, {{on: left, symmetry: true}}]
+    block:
+      mesh: {{shape: rectangle, size: [1.1, 1], cells: [4, 2], origin: [0, 1]}}
+      material: {{law: neo_hooke, E: 1.0e+7, nu: 0.3}}
+      supports: [{{on: top, displacement: [0, "-0.2*t"]}}, {{on: left, symmetry: true}}]
+contact: {{pairs: {{p: {{slave: {{body: block, on: bottom}}, master: {{body: base, on: top}}}}}}}}
+probes: {{force: {{body: base, quantity: reaction, on: bottom}}}}
+solver: {{newton: {{residual: 1.0e-11}}, linear: {{method: direct}}}}
+output: {{fields_every: 0, checkpoint_every: 0}}
+"""
+
+
+def test_the_first_step_of_a_contact_has_the_directions_of_all_others(tmp_path):
+    """Elastic and without friction: the force does not depend on the steps."""
+    one, two, eight = (run(PRESSED.format(1.0 / n), tmp_path / str(n))["force.y"][-1] for n in (1, 2, 8))
+    np.testing.assert_allclose([one, two], eight, rtol=1e-9)
+
+
+def block_above_base():
+    """(contact between them, status of its nodes if all slaves are in contact)"""
+    bodies = [
+        make_body("base", shapes.rectangle([3, 1], [6, 2])),
+        make_body("block", shapes.rectangle([1, 1], [2, 2], [1, 1])),
+    ]
+    structure, contact = make_contact(bodies, [(("block", "bottom"), ("base", "top"))])
+    structure.initialise(0.0, 1.0)
+    return contact, (contact.multipliers.areas > 0.0).astype(np.int8)
+
+
+def test_a_surface_whose_set_cycled_keeps_its_normals_until_it_parts():
+    """In the step that is taken again, in later ones and in resumed runs."""
+    contact, pressed = block_above_base()
+
+    def straight(contact, status):
+        contact.active_set.status[:] = status
+        contact.begin_step()
+        return contact.save()["straight"]
+
+    before = contact.save()
+    contact.begin_step()
+    for status in (pressed, 0 * pressed, pressed):
+        contact.active_set.choose(status)
+    contact.restore(before)
+    np.testing.assert_array_equal(straight(contact, pressed), pressed)
+    contact.end_step(1.0)
+    state = contact.save()
+    other, _ = block_above_base()
+    other.restore(state)
+    for resumed in (contact, other):
+        np.testing.assert_array_equal(straight(resumed, pressed), pressed)
+        assert not straight(resumed, 0 * pressed).any()
+        assert not straight(resumed, pressed).any()
+
+
+@pytest.mark.slow(seconds=60)
+def test_a_stiff_block_is_dragged_over_fine_cells(tmp_path):
+    """Slopes of facets at its rim lift the force by a fifth and lower it, until no equilibrium follows."""
+    forces, iterations = [], []
+    for sides in (
+        ["{body: block, on: bottom}", "{body: base, on: top}"],
+        ["{body: base, on: top}", "{body: block, on: bottom}"],
+    ):
+        text = SLEDGE.format(46, 12, 14, 10, *sides)
+        settings = {
+            "structure.bodies.base.mesh.size": "[3, 1]",
+            "structure.bodies.block.mesh.size": "[1, 0.6]",
+            "structure.bodies.block.mesh.origin": "[0.6, 1]",
+            "structure.bodies.block.material.E": "1.0e+7",
+            "structure.bodies.block.supports": '[{on: top, displacement: ["0.4*max(t - 0.5, 0)", "-0.1*min(t, 0.5)"]}]',
+            "contact.pairs.p.friction.coefficient": "0.3",
+            "time.end": "1.25",
+        }
+        history = run(text, tmp_path / sides[0][7:11], *settings.items())
+        assert history["time"][-1] == pytest.approx(1.25)
+        slides = history["time"] > 0.8
+        forces.append(np.abs(history["contact.p.x"][slides] / history["contact.p.y"][slides]))
+        iterations.append(history["iterations"].sum())
+    assert max(iterations) <= 1.5 * min(iterations)
+    assert [found.max() for found in forces] == pytest.approx([0.3, 0.3], rel=0.02)

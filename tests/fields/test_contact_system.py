@@ -11,6 +11,7 @@ from mpi4py import MPI
 from coupling.contact_surfaces import contact_surface
 from solvers.contact.contact import Contact
 from solvers.contact.law.frictionless import Frictionless
+from solvers.contact.law.law import SLIP
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
@@ -131,6 +132,8 @@ def prepare(make, seed=5):
     structure.begin_step(0.0, 0.1)
     structure.now.u[:] = rng.uniform(-0.01, 0.01, structure.layout.size)
     structure.now.u = structure.held.free_part(structure.now.u) + structure.target
+    contact.active_set.status[:] = SLIP
+    contact.begin_step()  # nodes near rims, which are in contact, have their directions
     structure.residual()
     pressure = rng.uniform(25.0, 35.0, len(contact.z))
     contact.z[:] = pressure[:, None] * contact.terms.normals

@@ -104,6 +104,18 @@ def test_an_arch_that_statics_takes_past_its_limit_point_is_said_to_snap(step):
     assert "take 'dynamics'" in finding.message
 
 
+def test_a_run_that_is_resumed_one_step_before_says_it_too():
+    first, second = (arch_under_a_plate(1.0, order=2) for _ in range(2))
+    assert snaps(first, 0.025, 0.35) == []
+    second.initialise(0.0, 0.025)
+    second.restore(first.save())
+    second.energy_sentinel.restore(first.energy_sentinel.save())
+    second.step(0.35, 0.025)
+    (finding,) = second.energy_sentinel.look(0.375, 0.025)
+    assert finding.kind == "snap"
+    assert "the step to t = 0.375 moved bodies" in finding.message
+
+
 @pytest.mark.parametrize(("pressure", "power"), [(0.03, 1), (-0.1, 1), (-0.1, 3)])
 def test_an_arch_below_its_limit_or_pulled_does_not_snap(pressure, power):
     assert snaps(arch_under_a_load(pressure, power), 0.05, 1.0) == []
