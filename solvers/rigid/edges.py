@@ -74,10 +74,10 @@ class Placed:
         cls, edges: Edges, x: Array, facets: NDArray[np.int64], box: tuple[Array, Array], margin: float
     ) -> Placed:
         """Those near a box; x: vertices of the surface [m]; facets: those of the surface."""
-        ends = x[edges.ends]
-        near = (ends.max(axis=1) >= box[0] - margin) & (ends.min(axis=1) <= box[1] + margin)
-        number = np.flatnonzero(near.all(axis=1))
-        ends = ends[number]
+        beyond = np.concatenate([x < box[0] - margin, x > box[1] + margin], axis=1) @ (1 << np.arange(6))
+        one_end, other_end = edges.ends.T
+        number = np.flatnonzero(beyond[one_end] & beyond[other_end] == 0)  # not both beyond the same side
+        ends = x[edges.ends[number]]
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         along = (ends[:, 1] - ends[:, 0]) / length[:, None]
         one, other = edges.facets[number].T
@@ -118,24 +118,28 @@ class Crossings:
 
 
 def crossings(one: Placed, other: Placed, margin: float, deepest: float) -> Crossings:
-    """The pairs whose gap is between -deepest and margin [m]."""
+    """The pairs whose gap is between -deepest and margin [m], and less than the longer of both edges.
+
+    Within surfaces of short edges vertices are as near, and edges that are deeper than they are long are not those that
+    meet.
+    """
     first, second = _near_each_other(one, other, max(margin, deepest))
-    one, other = one[first], other[second]
-    normal = np.cross(one.along, other.along)
-    sine = np.linalg.norm(normal, axis=1)
-    crossing = np.flatnonzero(sine > SINE)
-    one, other, sine = one[crossing], other[crossing], sine[crossing]
-    across = normal[crossing] / sine[:, None]
-    way = other.first - one.first
-    gap = -np.einsum("md,md->m", way, across)
-    share = np.einsum("md,md->m", np.cross(way, other.along), across) / sine
-    share_other = np.einsum("md,md->m", np.cross(way, one.along), across) / sine
-    sign = np.where(np.einsum("md,md->m", across, other.outward - one.outward) < 0.0, -1.0, 1.0)
-    across, gap = sign[:, None] * across, sign * gap
-    inside = (share > 0.0) & (share < one.length) & (share_other > 0.0) & (share_other < other.length)
-    chosen = np.flatnonzero(inside & (gap < margin) & (gap > -deepest) & other.allow(across) & one.allow(-across))
-    one = one[chosen]
-    return Crossings(one, other[chosen], gap[chosen], across[chosen], one.first + share[chosen, None] * one.along)
+    along, along_other = one.along[first], other.along[second]
+    normal, way = np.cross(along, along_other), other.first[second] - one.first[first]
+    square = np.einsum("md,md->m", normal, normal)
+    crossing = square > SINE**2
+    square = np.where(crossing, square, 1.0)
+    share = np.einsum("md,md->m", np.cross(way, along_other), normal) / square
+    crossing &= (share > 0.0) & (share < one.length[first])
+    share_other = np.einsum("md,md->m", np.cross(way, along), normal) / square
+    crossing &= (share_other > 0.0) & (share_other < other.length[second])
+    one, other, share = one[first[crossing]], other[second[crossing]], share[crossing]
+    normal, way = normal[crossing] / np.sqrt(square[crossing, None]), way[crossing]
+    normal *= np.where(np.einsum("md,md->m", normal, other.outward - one.outward) < 0.0, -1.0, 1.0)[:, None]
+    gap = -np.einsum("md,md->m", way, normal)
+    near = (gap < margin) & (gap > -deepest) & (np.abs(gap) < np.maximum(one.length, other.length))
+    at = one.first + share[:, None] * one.along
+    return Crossings(one, other, gap, normal, at)[near & other.allow(normal) & one.allow(-normal)]
 
 
 def gaps_of_lines(first: tuple[Array, Array], second: tuple[Array, Array], n: Array) -> Array:
@@ -146,27 +150,17 @@ def gaps_of_lines(first: tuple[Array, Array], second: tuple[Array, Array], n: Ar
 
 
 def _near_each_other(one: Placed, other: Placed, within: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Places of all pairs that may be nearer than `within`. Edges of about the same length have a tree."""
-    from scipy.spatial import cKDTree
+    """Places of all pairs that may be nearer than `within` and than the longer edge.
 
-    first, second = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    sorted_by_length = [[np.flatnonzero(size == k) for k in np.unique(size)] for size in _sizes(one, other)]
-    for own in sorted_by_length[0]:
-        tree = cKDTree(_middles(one, own))
-        for beside in sorted_by_length[1]:
-            reach = within + 0.5 * float(one.length[own].max() + other.length[beside].max())
-            found = tree.query_ball_point(_middles(other, beside), reach)
-            second.append(np.repeat(beside, [len(some) for some in found]))
-            first.append(own[np.concatenate([np.empty(0), *found]).astype(np.int64)])
-    return np.concatenate(first), np.concatenate(second)
+    There are few: edges are convex, so that surfaces with many are near each other in small parts.
+    """
+    from scipy.spatial.distance import cdist  # the import takes long: only runs with contact need it
 
-
-def _sizes(*edges: Placed) -> list[NDArray[np.int64]]:
-    return [np.frexp(some.length)[1].astype(np.int64) for some in edges]
-
-
-def _middles(edges: Placed, which: NDArray[np.int64]) -> Array:
-    return edges.first[which] + 0.5 * edges.length[which, None] * edges.along[which]
+    middles = (edges.first + 0.5 * edges.length[:, None] * edges.along for edges in (one, other))
+    lengths = one.length[:, None], other.length[None]
+    reach = np.minimum(within, np.maximum(*lengths)) + 0.5 * (lengths[0] + lengths[1])
+    first, second = np.nonzero(cdist(*middles) <= reach)
+    return first, second
 
 
 def _normals(x: Array, facets: NDArray[np.int64]) -> Array:
