@@ -85,6 +85,15 @@ def test_a_bar_lies_across_an_obstacle_that_rises():
     assert pushed(found)[:3] == pytest.approx([0.0, 0.0, weight(upper)], abs=1e-9 * weight(upper))
 
 
+def test_a_bar_lies_across_the_rims_of_an_open_plate():
+    """A surface without thickness: its rims have one facet."""
+    plate = np.array([[-0.25, -2.0, 0.5], [0.25, -2.0, 0.5], [0.25, 2.0, 0.5], [-0.25, 2.0, 0.5]])
+    upper = box("upper", (4.0, 0.5, 0.5), (0.03, 0.02, 0.8))
+    found = run([upper], [RigidPair(0, Obstacle("plate", plate, np.array([[0, 1, 2], [0, 2, 3]])), 0.3)])
+    assert pushed(found) == pytest.approx([0.0, 0.0, weight(upper), 0.0, 0.0, 0.0], abs=1e-9 * weight(upper))
+    assert upper.inertia.centre[2] + found.now[0].shift[2] == pytest.approx(0.75, abs=1e-9)
+
+
 @pytest.mark.parametrize("beside", [(), (1e5, 3.0)], ids=["alone", "heavy body far away"])
 def test_a_beam_on_two_ridges_loads_them_by_its_levers(beside):
     ridges = [
