@@ -11,7 +11,7 @@ The grid is cut at the first position of the bodies during the start, so that th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -20,6 +20,10 @@ from coupling.coupled import Coupled
 from coupling.divided import lengths
 from coupling.ports import Start
 from solvers.api import Array, StepFailed
+from solvers.exchange import Motion
+
+#: Way in the first step, in cells, below which a body counts as at rest: its acceleration may be rounding.
+REST = 1e-6
 
 #: Note for the user.
 NO_BALANCE = (
@@ -117,17 +121,50 @@ def _share_acceleration(
     moved = start.solid.steps * dt**2 * start.solid.acceleration()
     if moved > start.flow.smallest_cell:
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
-    for number in range(start.solid.steps):
-        if number > 0:
-            start.solid.repeat()
-        before = interface.displacement()
-        with start.flow.step(t, start.flow.share * dt, dt):
-            interface.begin_start(coupled.flow.difference, velocity)
-            with start.solid.step(t, dt):
-                solve()
-    acceleration = (interface.displacement() - before) / dt**2
+    if start.solid.steps == 1:
+        dt = _resolving(coupled, start, t, dt, velocity, solve)
+    acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
     force = coupled.force()
     start.solid.end()
     interface.end_start(dt, velocity, acceleration)
     start.flow.end(dt, [interface.at_start(velocity, past) for past in interface.past])
     coupled.balance.given = coupled.solid.reduced(force)
+
+
+def _acceleration(
+    coupled: Coupled, start: Start, t: float, dt: float, short: float, velocity: Array, solve: Callable[[], object]
+) -> Array:
+    """Take the start steps, and return the acceleration [m/s^2] of the vertices; short: step of the flow [s]."""
+    interface = coupled.interface
+    for number in range(start.solid.steps):
+        if number > 0:
+            start.solid.repeat()
+        before = interface.displacement()
+        with start.flow.step(t, short, dt):
+            interface.begin_start(coupled.flow.difference, velocity)
+            with start.solid.step(t, dt):
+                solve()
+    return (interface.displacement() - before) / dt**2
+
+
+def _resolving(
+    coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, solve: Callable[[], object]
+) -> float:
+    """Length [s] of the first step, dt / 2^m, within which no body's acceleration decays much.
+
+    A body that the flow brakes by the rate L has the acceleration a / (1 + L k) in a step k of backward Euler. With
+    a step k = dt and one that is short, L dt follows; the first step is not longer than 1 / L.
+    """
+    initial, found = coupled.save(), list[Mapping[str, Motion]]()
+    for short in (dt, start.flow.share * dt):
+        try:
+            a = _acceleration(coupled, start, t, dt, short, velocity, solve)
+        except StepFailed:
+            return dt
+        finally:
+            coupled.restore(initial)
+        found.append(coupled.interface.at_start(a))
+    late, soon = ([float(np.linalg.norm(motion.v, axis=1).max()) for motion in some.values()] for some in found)
+    least = REST * start.flow.smallest_cell / dt**2
+    decay = max((a / b - 1.0 for a, b in zip(soon, late, strict=True) if min(a, b) > least), default=0.0)
+    return lengths(dt, dt / decay)[0] if decay > 1.0 else dt

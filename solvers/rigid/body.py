@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.rigid.edges import Edges
 from solvers.rigid.inertia import Inertia, about
 from solvers.rigid.rotation import skew
 from solvers.values import Value, evaluate
@@ -54,6 +56,11 @@ class RigidBody:
     @property
     def dim(self) -> int:
         return self.points.shape[1]
+
+    @cached_property
+    def edges(self) -> Edges:
+        """Its sharp edges, in 3D."""
+        return Edges.of(self.points, self.facets)
 
     @property
     def extent(self) -> float:

@@ -25,7 +25,7 @@ from solvers.api import Array, StepFailed
 from solvers.rigid.body import RigidBody
 from solvers.rigid.coulomb import Touch, braced, contact_forces, positive_definite
 from solvers.rigid.impact import AT_BOUND, Closed
-from solvers.rigid.near import Moment, Near, Obstacle, RigidPair, search, vertices
+from solvers.rigid.near import Moment, Near, Obstacle, RigidPair, same_rows, search, vertices
 from solvers.rigid.turning import turning
 
 __all__ = ["Obstacle", "RigidContact", "RigidPair"]
@@ -67,11 +67,11 @@ class RigidContact:
         self.tangent = self.stiffness  #: of the bodies, that the forces of the last `press` belong to
         self._start: Array | None = None  # forces in the frames at the last press of this step
         self._measured = 0  # in this step
-        self._pressing = np.empty(0, dtype=np.int64), self.near.x  # vertices and forces [N] in space at the last press
+        self._pressing = self.near.names(), self.near.x  # names and forces [N] in space at the last press
 
     def begin_step(self) -> None:
         """Nothing is known of the contact forces."""
-        self._pressing, self._measured = (np.empty(0, dtype=np.int64), self.near.x[:0]), 0
+        self._pressing, self._measured = (self.near.names()[:0], self.near.x[:0]), 0
 
     def end_prediction(self) -> None:
         """Facets may change again; the contact forces are a guess."""
@@ -114,7 +114,7 @@ class RigidContact:
         self.touch = self.near.touch(moment, components, free)
         self.z = np.zeros_like(self.near.x)
         known, forces = self._pressing
-        _, at, of = np.intersect1d(self.near.vertex, known, return_indices=True)
+        at, of = same_rows(self.near.names(), known)
         if len(at):
             self.stiffness = -turning(self.near[at], forces[of], moment, components, free)
             self._start = np.zeros_like(self.z)
@@ -152,7 +152,7 @@ class RigidContact:
             self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
         active = self.active
         in_space = np.einsum("mde,md->me", self.near.frame[active], self.z[active])
-        self._pressing = self.near.vertex[active], in_space
+        self._pressing = self.near.names()[active], in_space
 
     def transformation(self) -> RowTransformation | None:
         """Transformation that eliminates the forces from J du = b + F z with C du = -c; None without contact.

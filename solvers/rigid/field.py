@@ -188,12 +188,11 @@ class RigidBodies:
             for some, by_flow in ((self.now, self.on_surface), (self.old, self.on_surface_old))
         )
         mean = weight * force + (1.0 - weight) * force_before
-        gyroscopic = self._by_component(
-            np.array([motion.gyroscopic(b, i) for b, i in zip(self.bodies, self.now, strict=True)])
-        )
-        pushed = solver(mass)(mean + w * self.pressed + (1.0 - w) * self.pressed_old)
+        gyroscopic = self._by_component(np.array(list(map(motion.gyroscopic, self.bodies, self.now))))
+        turned = self._by_component(np.array(list(map(motion.turned_on, self.bodies, self.old, self.now))))
+        pushed = self.current.dt * (mean + w * self.pressed + (1.0 - w) * self.pressed_old)
         force = force + self.pressed
-        without = np.where(self._free, before + self.current.dt * pushed, self._velocity(self.now))
+        without = np.where(self._free, before + solver(mass)(turned + pushed), self._velocity(self.now))
         closed = self.contact.closed(mass, without, np.where(self._free, force, 0.0), gyroscopic)
         velocity, rate = closed.after(before, without, self.contact.restitution)
         rate = np.where(self._free, rate, self._by_component(np.array([now.p for now in self.now])))

@@ -74,6 +74,12 @@ def gyroscopic(body: RigidBody, now: RigidInstant) -> Array:
     return np.concatenate([np.zeros(3), now.R @ np.cross(W, body.inertia.tensor @ W)])
 
 
+def turned_on(body: RigidBody, old: RigidInstant, now: RigidInstant) -> Array:
+    """Momentum at the start of a step less that of the same velocities in space at its end [N s, N m s], shape (6,)."""
+    velocity = np.concatenate([old.v[:3], spin(old)])
+    return momentum(body, old.R, old.v) - mass(body, now.R) @ velocity
+
+
 def kinetic_energy(body: RigidBody, now: RigidInstant) -> float:
     """Kinetic energy [J]."""
     return 0.5 * float(body.inertia.mass * now.v[:3] @ now.v[:3] + now.v[3:] @ body.inertia.tensor @ now.v[3:])

@@ -13,6 +13,7 @@ from solvers.api import Array
 from solvers.mesh.periods import gap_of_boxes, no_periods, way_of, ways_to, without_longer
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.coulomb import Touch
+from solvers.rigid.edges import BEHIND, Crossings, Edges, Placed, crossings, gaps_of_lines
 from solvers.rigid.gaps import Gaps, RigidWall, gaps, unit_normals
 from solvers.rigid.motion import RigidInstant
 from solvers.rigid.surface import positions
@@ -26,6 +27,9 @@ NEAR_BODY = 0.25
 #: to 0.25 piles of discs move alike, in as many iterations; with 0.25 a step costs a third more.
 NEAR_BOXES = 0.05
 
+
+#: Number of the edges that cross at a vertex.
+NO_EDGE = np.array(-1)
 
 #: Images along an axis that have numbers of their own, those of both directions.
 IMAGES = 2**12
@@ -43,6 +47,11 @@ class Obstacle:
     def at(self, t: float) -> Array:
         """Positions [m] of the vertices at the time t [s]."""
         return self.points if self.motion is None else self.motion(t)
+
+    @cached_property
+    def edges(self) -> Edges:
+        """Its sharp edges, in 3D."""
+        return Edges.of(self.points, self.facets)
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,7 @@ class Moment:
 class _Side:
     """A surface at one time."""
 
+    of: RigidBody | Obstacle
     body: int  #: index of its body, -1 of an obstacle
     x: Array  #: positions of the vertices [m], shape (n, dim)
     facets: NDArray[np.int64]
@@ -104,6 +114,16 @@ class _Side:
             np.add.at(found, corner, normals)
         return found
 
+    def edges_near(self, other: _Side, margin: float) -> Placed:
+        """Sharp edges near the box of another surface."""
+        return Placed.within(self.of.edges, self.x, self.facets, other.box, margin)
+
+    def before(self, x: Array, facets: NDArray[np.int64], moment: Moment) -> Array:
+        """Positions [m] at the start of the step of what is at the points x of facets now, shape (n, 3)."""
+        if self.body >= 0:
+            return x - moment.carried(self.body, x if self.way is None else x - self.way)
+        return x if self.moved is None else x - _moved_below(x, self, facets)
+
     def image(self, way: Array) -> _Side:
         """The image some periods further."""
         return replace(self, x=self.x + way, way=way) if way.any() else self
@@ -111,18 +131,23 @@ class _Side:
 
 @dataclass(frozen=True)
 class Near:
-    """Vertices near another surface, shape (m,). Frames have the normal as their first row, then the tangents."""
+    """Vertices near another surface, and points where edges of both cross, shape (m,).
 
-    vertex: NDArray[np.int64]  #: numbers among those of all pairs
+    Frames have the normal as their first row, then the tangents.
+    """
+
+    vertex: NDArray[np.int64]  #: numbers among those of all pairs; where edges cross an end of the first one
+    edge: NDArray[np.int64]  #: number of the pair of edges that cross, -1: a vertex
     body: NDArray[np.int64]  #: indices of the bodies of the vertex and of the surface, -1: none, shape (m, 2)
     way: Array  #: by whole periods, from the surface to its image that the vertex is near [m], shape (m, dim)
     gap: Array  #: [m]
     frame: Array  #: unit vectors, shape (m, dim, dim)
-    x: Array  #: positions of the vertices [m], shape (m, dim)
+    x: Array  #: positions of the vertices, or on the first edges [m], shape (m, dim)
     carried: Array  #: displacements in the step of the vertices relative to the surface [m], shape (m, dim)
     given: Array  #: the same, by motions of obstacles alone [m], shape (m, dim)
     friction: Array  #: coefficients
     facet: NDArray[np.int64]  #: of the surface, shape (m,)
+    along: Array  #: unit vectors along both edges, zero at a vertex, shape (m, 2, dim)
 
     @classmethod
     def joined(cls, parts: Sequence[Near], dim: int) -> Near:
@@ -132,11 +157,17 @@ class Near:
             numbers = np.empty(0, dtype=np.int64)
             frame = np.empty((0, dim, dim))
             pairs = numbers.reshape(0, 2)
-            return cls(numbers, pairs, vectors, ones, frame, vectors, vectors, vectors, ones, numbers)
+            return cls(
+                numbers, numbers, pairs, vectors, ones, frame, vectors, vectors, vectors, ones, numbers, frame[:, :2]
+            )
         return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
 
     def __getitem__(self, which: NDArray) -> Near:
         return Near(*(getattr(self, one.name)[which] for one in fields(self)))
+
+    def names(self) -> NDArray[np.int64]:
+        """What tells them apart, shape (m, 2)."""
+        return np.stack([self.vertex, self.edge], axis=1)
 
     def arms(self, moment: Moment) -> Array:
         """Vectors from the centres of both bodies to the vertex and to its foot [m], shape (m, 2, 3)."""
@@ -157,6 +188,12 @@ class Near:
     def in_frame(self, vectors: Array) -> Array:
         """Components of vectors (m, dim) in the frames."""
         return np.einsum("mde,me->md", self.frame, vectors)
+
+
+def same_rows(one: NDArray[np.int64], other: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places in both of the rows that both have, each once; shapes (n, 2) and (m, 2)."""
+    number = np.unique(np.concatenate([one, other]), axis=0, return_inverse=True)[1].ravel()
+    return np.intersect1d(number[: len(one)], number[len(one) :], return_indices=True)[1:]
 
 
 def vertices(bodies: Sequence[RigidBody], pair: RigidPair) -> int:
@@ -184,7 +221,7 @@ def search(
     found: list[Near] = []
     obstacles = {id(pair.other): pair.other for pair in pairs if isinstance(pair.other, Obstacle)}
     beside_all = {key: _side(obstacle, moment) for key, obstacle in obstacles.items()}
-    sides = [_Side(index, at, moment.bodies[index].facets, None) for index, at in enumerate(x)]
+    sides = [_Side(moment.bodies[index], index, at, moment.bodies[index].facets, None) for index, at in enumerate(x)]
     lengths = no_periods(x[0].shape[1]) if lengths is None else lengths
     for number, periods in _near_pairs(pairs, low, high, beside_all, lengths):
         pair, start = pairs[number], starts[number] + starts[-1] * image_number(periods)
@@ -194,7 +231,7 @@ def search(
             at = other.gaps(own.x)
             close = np.flatnonzero(at.gap < NEAR_BODY * float((high[body] - low[body]).max()))
             at = Gaps(at.gap[close], at.normal[close], close)
-            found.append(_near(start + close, own, close, at, None, pair.friction, moment))
+            found.append(_near(start + close, NO_EDGE, own, own.x[close], at, None, pair.friction, moment))
             continue
         beside, way = sides[other] if isinstance(other, int) else beside_all[id(other)], way_of(periods, lengths)
         for first, points, surface in (
@@ -202,6 +239,8 @@ def search(
             (start + len(own.x), beside, own.image(-way)),
         ):
             found += _vertices_near(first, points, surface, pair.friction, moment, kept)
+        if own.x.shape[1] == 3:
+            found.append(_edges_near(start, own, beside.image(way), pair.friction, moment))
     return Near.joined(found, x[0].shape[1])
 
 
@@ -243,7 +282,7 @@ def _near_pairs(
 def _side(obstacle: Obstacle, moment: Moment) -> _Side:
     here = obstacle.at(moment.t)
     rests = obstacle.motion is None or moment.dt <= 0.0
-    return _Side(-1, here, obstacle.facets, None if rests else here - obstacle.at(moment.t - moment.dt))
+    return _Side(obstacle, -1, here, obstacle.facets, None if rests else here - obstacle.at(moment.t - moment.dt))
 
 
 def _vertices_near(
@@ -267,29 +306,57 @@ def _vertices_near(
     near, at = near[close], Gaps(at.gap[close], at.normal[close], facing[at.facet[close]])
     if kept is not None:
         _keep(at, start + near, points.x[near], surface, kept)
-    return [_near(start + near, points, near, at, surface, friction, moment)]
+    given = None if points.moved is None else points.moved[near]
+    return [_near(start + near, NO_EDGE, points, points.x[near], at, surface, friction, moment, given)]
 
 
 def _keep(at: Gaps, vertex: NDArray[np.int64], x: Array, surface: _Side, kept: Near) -> None:
     """Let vertices that `kept` has face the planes of their facets there."""
+    kept = kept[kept.edge < 0]
     _, here, there = np.intersect1d(vertex, kept.vertex, return_indices=True)
     corners = surface.x[surface.facets[kept.facet[there]]]
     at.normal[here], at.facet[here] = unit_normals(corners), kept.facet[there]
     at.gap[here] = np.einsum("nd,nd->n", x[here] - corners[:, 0], at.normal[here])
 
 
+def _edges_near(start: int, points: _Side, surface: _Side, friction: float, moment: Moment) -> Near:
+    """The points of a body where its edges cross those of another surface."""
+    size = min(points.extent, surface.extent)
+    margin = NEAR_BOXES * size
+    found = crossings(points.edges_near(surface, margin), surface.edges_near(points, margin), margin, NEAR_BODY * size)
+    if (found.gap < -BEHIND * size).any():
+        found = found[_apart_before(found, points, surface, moment) > -BEHIND * size]
+    edge = found.one.number * len(surface.of.edges.ends) + found.other.number
+    at = Gaps(found.gap, found.normal, surface.of.edges.facets[found.other.number, 0])
+    vertex = start + points.of.edges.ends[found.one.number, 0]
+    near = _near(vertex, edge, points, found.at, at, surface, friction, moment)
+    return replace(near, along=np.stack([found.one.along, found.other.along], axis=1))
+
+
+def _apart_before(found: Crossings, points: _Side, surface: _Side, moment: Moment) -> Array:
+    """Gaps [m] of the lines of edges at the start of the step."""
+    ends = []
+    for placed, side in ((found.one, points), (found.other, surface)):
+        facets = side.of.edges.facets[placed.number, 0]
+        last = placed.first + placed.length[:, None] * placed.along
+        ends.append((side.before(placed.first, facets, moment), side.before(last, facets, moment)))
+    return gaps_of_lines(ends[0], ends[1], found.normal)
+
+
 def _near(
     vertex: NDArray[np.int64],
+    edge: NDArray[np.int64],
     points: _Side,
-    chosen: NDArray[np.int64],
+    x: Array,
     at: Gaps,
     surface: _Side | None,
     friction: float,
     moment: Moment,
+    given: Array | None = None,
 ) -> Near:
-    x = points.x[chosen]
+    """Points x [m] of a body, or of an obstacle that has moved by `given` [m] in the step."""
     foot = x - at.gap[:, None] * at.normal
-    given = np.zeros_like(x) if points.moved is None else points.moved[chosen].copy()
+    given = np.zeros_like(x) if given is None else given.copy()
     if surface is not None and surface.moved is not None:
         given -= _moved_below(foot, surface, at.facet)
     carried = given.copy()
@@ -300,7 +367,9 @@ def _near(
         carried -= moment.carried(surface.body, foot - way)
     body = np.tile([points.body, -1 if surface is None else surface.body], (len(x), 1))
     friction_of = np.full(len(x), friction)
-    return Near(vertex, body, way, at.gap, _frames(at.normal), x, carried, given, friction_of, at.facet)
+    edge = np.broadcast_to(edge, len(x))
+    along = np.zeros((len(x), 2, x.shape[1]))
+    return Near(vertex, edge, body, way, at.gap, _frames(at.normal), x, carried, given, friction_of, at.facet, along)
 
 
 def _frames(normals: Array) -> Array:

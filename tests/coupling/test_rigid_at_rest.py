@@ -37,6 +37,15 @@ BALL = (
     .replace("translate: [0.528, 0.16], rotate: {angle: 7.5}", "translate: [0.31, 0.28, 0.1501]")
     .replace("free: {density: 8}", "free: {density: 8, held: [rotation]}")
 )
+#: A bar that lies across another one: no vertex of one is on the other.
+BARS = (
+    BALL.replace("end: 0.4", "end: 0.3")
+    .replace("to: [0.6, 0.6, 0.5], cells: [6, 6, 5]", "to: [0.6, 0.6, 0.6], cells: [6, 6, 6]")
+    .replace("shape: sphere, radius: 0.15, cells: [3, 1], translate: [0.31, 0.28, 0.1501]",
+             "shape: box, size: [0.4, 0.2, 0.2], cells: [1, 1, 1], translate: [0.11, 0.18, 0.281]")
+    .replace("free: {density: 8, held: [rotation]}}", "free: {density: 8}}\n"
+             "    lower: {mesh: {shape: box, size: [0.2, 0.46, 0.2], cells: [1, 1, 1], translate: [0.21, 0.07, 0.08]}}")
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -49,6 +58,7 @@ BALL = (
             DISC.replace("viscosity: 0.5\n  element: q1q1", "viscosity: 0.02\n  element: q2q1"), "y", 2e-3, id="q2q1"
         ),
         pytest.param(BALL, "z", 1e-6, id="ball"),
+        pytest.param(BARS, "z", 1e-6, id="bars that cross"),
     ],
 )
 def test_contact_carries_what_the_fluid_does_not(tmp_path, text, up, flows):

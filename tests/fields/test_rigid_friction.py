@@ -255,8 +255,8 @@ def test_contact_forces_turn_with_the_bodies():
     bodies.residual()
     inside = np.abs(contact.near.gap) < 0.2
     z = np.where(inside[:, None], rng.random(contact.z.shape), 0.0)
-    vertex = contact.near.vertex
-    contact._pressing = vertex, np.einsum("mde,md->me", contact.near.frame, z)
+    vertex, names = contact.near.vertex, contact.near.names()
+    contact._pressing = names, np.einsum("mde,md->me", contact.near.frame, z)
     u = bodies.increments()
 
     def force(shift) -> np.ndarray:
@@ -272,7 +272,7 @@ def test_contact_forces_turn_with_the_bodies():
         step[column] = h
         difference = (force(step) - force(-step)) / (2.0 * h)
         bodies.set_increments(u)
-        contact._pressing = vertex, np.einsum("mde,md->me", contact.near.frame, z)
+        contact._pressing = names, np.einsum("mde,md->me", contact.near.frame, z)
         contact.measure(contact._moment, bodies.components, bodies._free)
         assert -contact.stiffness.toarray()[:, column] == pytest.approx(difference, abs=1e-6)
 
