@@ -316,7 +316,7 @@ def find_sheets(
         return None
     if tied is not None:
         moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
-    parts = parts_of_fluid(grid, moments, surfaces, x)
+    parts = parts_of_fluid(grid, moments, surfaces, x, None if before is None else before.parts.geometry)
     cells, links, special = parts.cell, parts.links, parts.special
     if not len(cells) and not always:  # all surfaces are outside of the box
         return None
