@@ -59,7 +59,7 @@ def positions(dim, draw, count):
 @pytest.mark.parametrize("draws", [range(4), pytest.param(range(4, 60), marks=pytest.mark.slow)], ids=str)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_numbers_that_are_kept_are_those_of_a_fresh_search(dim, draws):
-    """Bit for bit, as the table of cut cells, whatever was before; numbers are kept in some positions, not in others."""
+    """Bit for bit, as the table of cut cells, whatever was before; numbers are kept in some places, not in others."""
     points, facets = plate(dim)
     grid, every, kept = grid_of(dim), np.concatenate([facets + k * len(points) for k in range(3)]), []
     for draw in draws:
