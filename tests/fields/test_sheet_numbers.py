@@ -9,6 +9,7 @@ from thin_space import turn
 
 from solvers.fluid.flow.thin_bodies import ThinBodies
 from solvers.fluid.geometry.pieces import off_boundary
+from solvers.fluid.geometry.thin.sheet_windows import SheetWindows
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.surfaces.surface import Motion
@@ -79,3 +80,24 @@ def test_numbers_that_are_kept_are_those_of_a_fresh_search(dim, draws):
             assert all(np.array_equal(*pair) for pair in zip(*tables, strict=True)), draw
             before = follows
     assert 0 < np.sum(kept) < len(kept)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_windows_follow_the_fluid(dim, degree):
+    """A node before an end reaches the copies of both sides, and takes the one that has more fluid now."""
+    points, facets = plate(dim)
+    grid, up = grid_of(dim), np.eye(dim)[1]
+    off = off_boundary(grid, points[facets])
+    low, high = (find_sheets(grid, facets, points + way * up, off, always=True) for way in (-0.1, 0.1))
+    assert low.same_unknowns(high)
+    numbers = np.arange(low.node_count(degree))
+    index = np.stack(np.unravel_index(low.on_lattice(numbers, degree), low.lattice_shape(degree), order="F"), axis=1)
+    follows, before, fresh = (SheetWindows(sheets, degree, numbers) for sheets in (low, low, high))
+    for layers in (0, 2):
+        follows.cells_around(numbers, index, layers)
+    follows.follow(high)
+    for layers in (0, 2):
+        found, was, expected = (one.cells_around(numbers, index, layers) for one in (follows, before, fresh))
+        assert all(np.array_equal(*pair) for pair in zip(found, expected, strict=True))
+    assert not np.array_equal(was[0], expected[0])
