@@ -74,6 +74,8 @@ def distribute(
 
 def _find_surfaces(domain: Domain, named: dict[str, NDArray[np.int64]]) -> dict[str, NDArray[np.int32]]:
     """Local facets of each named surface, found by their corner nodes (whatever the facet's node order)."""
+    if not named:
+        return {}
     mesh = domain.mesh
     dim = mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)

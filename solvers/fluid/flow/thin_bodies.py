@@ -143,6 +143,7 @@ class ThinBodies:
             joined=joined,
             tied=ties,
             repeated=self._repeated,
+            before=self._sheets,
         )
 
     def release(self, facets: NDArray[np.int64], motion: Motion) -> bool:

@@ -45,22 +45,22 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
         np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.is_active)
     )
     share[sheets.left], is_active[sheets.left], is_active[box : box + sheets.singles] = 0.0, False, True
-    for number, of_cell in sheets.shares.items():
-        share[number] = of_cell.fraction
+    (part, has), regions = sheets.of_shares, sheets.parts.region
+    share[has] = sheets.fluid[has]
     place = np.full(len(original), -1)
     place[cells] = np.arange(len(cells))
-    for number, of_cell in sheets.shares.items():
-        if (cell := local[number]) >= 0 and (found := of_cell.integrals(points)) is not None:
-            fluid[place[cell]], fraction[cell] = found / weights, of_cell.fraction
     table = sheets.parts.geometry.table(len(points))
-    rows_of = np.full(len(table.cell), -1)
-    owner = np.arange(box)
-    owner[list(sheets.successors)] = -1
-    for number, of_cell in sheets.shares.items():
-        if of_cell.regions:
-            rows_of[of_cell.regions] = place[local[number]] if local[number] >= 0 else -1
-        else:
-            owner[sheets.box_cells(np.array([number]))] = number
+    rows_of, owner = np.full(len(table.cell), -1), np.arange(box)
+    owner[sheets.left] = owner[sheets.box_cells(has)] = -1
+    whole = regions[part] < 0  # the cell has all of the fluid
+    owner[sheets.box_cells(has[whole])] = has[whole]
+    mine = ~whole & (local[has] >= 0)
+    part, at = part[mine], local[has[mine]]
+    row = rows_of[regions[part]] = place[at]
+    fluid[row] = 0.0
+    np.add.at(fluid, row, table.moments[regions[part]])
+    fluid[row] /= weights
+    fraction[at] = share[original[at]]
     cell_of_piece = grid.numbers[cut.cut[cut.pieces.cell]]
     target = owner[cell_of_piece]
     target = np.where((target >= 0) & (local[target] >= 0), place[local[target]], -1)
@@ -115,8 +115,8 @@ def _passable(
     assert grid.sheets is not None
     interior, sides = grid.find_interior_faces()
     ends = sides[np.searchsorted(interior, faces)]
-    pairs = np.sort(grid.numbers[ends], axis=1)
-    parted = np.array([pair in grid.sheets.parted for pair in map(tuple, pairs.tolist())], dtype=bool)
+    pairs = np.sort(grid.numbers[ends], axis=1).astype(np.int64)
+    parted = np.isin(pairs @ [grid.grid.size, 1], grid.sheets.parted)
     return for_faces[ends].all(axis=1) | ~(empty[ends].any(axis=1) | parted)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
 from scipy import ndimage
 
 from solvers.api import Array, Indices, Mask
-from solvers.cut_cells import CellState, ClosedSurfaces, CutTable, components_of, cut_cells
+from solvers.cut_cells import CellCutter, CellState, ClosedSurfaces, CutTable, components_of
 from solvers.fluid.geometry.pieces import NOTHING, place_of
 from solvers.fluid.geometry.regions import (
     SAME_VOLUME,
@@ -42,17 +42,29 @@ class Geometry:
     grid: Grid
     surfaces: ClosedSurfaces
     x: Array  #: vertices [m]
+    cutters: dict[int, CellCutter] = field(default_factory=dict)  #: by Gauss points; shared with other positions
+
+    def followed(self, surfaces: ClosedSurfaces, x: Array) -> Geometry:
+        """The same grid at another position; cells are kept none of whose facets moved."""
+        same = (np.array_equal(getattr(self.surfaces, k), getattr(surfaces, k)) for k in ("facets", "body"))
+        return Geometry(self.grid, surfaces, x, self.cutters if all(same) else {})
 
     @cached_property
     def table(self) -> Callable[[int], CutTable]:
         """The table for so many Gauss points in each direction, of `COUNTS`; regions are the same for all."""
-        return cache(lambda count: self.cut(self.grid.edges, count))
+        return cache(self._of_grid)
+
+    def _of_grid(self, count: int) -> CutTable:
+        if count not in self.cutters:
+            self.cutters[count] = self._cutter(self.grid.edges, count)
+        return self.cutters[count].cut(within_reach(self.grid, self.x))
 
     def cut(self, edges: Sequence[Array], count: int) -> CutTable:
         """The table of these grid lines."""
-        return cut_cells(
-            edges, gauss(count)[0], self.surfaces, within_reach(self.grid, self.x), closing=closing_length(self.grid)
-        )
+        return self._cutter(edges, count).cut(within_reach(self.grid, self.x), keep=False)
+
+    def _cutter(self, edges: Sequence[Array], count: int) -> CellCutter:
+        return CellCutter(edges, gauss(count)[0], self.surfaces, closing=closing_length(self.grid))
 
 
 @dataclass(frozen=True)
@@ -127,14 +139,16 @@ class FluidParts:
         return min(bounding, key=lambda k: len(bounding[k] ^ around), default=-1)
 
 
-def parts_of_fluid(grid: Grid, moments, surfaces: ClosedSurfaces, x: Array) -> FluidParts:
-    """Parts of the fluid around surfaces with vertices at x [m].
+def parts_of_fluid(
+    grid: Grid, moments, surfaces: ClosedSurfaces, x: Array, before: Geometry | None = None
+) -> FluidParts:
+    """Parts of the fluid around surfaces with vertices at x [m]; before: of an earlier position on this grid.
 
     moments: of `kernels.moments`; cells that these count as solid but for rounding have no parts, unless surfaces touch
     there.
     Where one body overlaps itself its regions are not known, and all fluid of the cell is one part.
     """
-    geometry = Geometry(grid, surfaces, x)
+    geometry = Geometry(grid, surfaces, x) if before is None else before.followed(surfaces, x)
     table, fluid = geometry.table(3), 1.0 - moments.fraction
     special = (table.state != CellState.FLUID) | (fluid < 1.0 - SAME_VOLUME)
     special[moments.cells] = True

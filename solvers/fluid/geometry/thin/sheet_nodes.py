@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from solvers.algebra.connected import connected_parts
-from solvers.api import Array, Indices, Mask
+from solvers.api import Indices, Mask
 from solvers.fluid.geometry.thin.fluid_parts import FluidParts
 from solvers.fluid.grid.box import Grid
 
@@ -28,16 +28,16 @@ def same_nodes(parts: FluidParts, joined: Joined) -> list[tuple[int, int]]:
 def node_copies(
     grid: Grid,
     cells: Indices,
-    share: Array,
     links: Indices,
     same: Sequence[tuple[int, int]],
     special: Mask,
 ) -> Indices:
     """Number of the copy that each node of a part's cell is, in the lattice of second degree, shape (parts, nodes).
 
-    cells, share: of the parts, and their volumes as shares of these; links: (part, part of the next cell, axis); same:
-    pairs of parts of a cell with the same nodes.
-    Among the parts around a node, those with the most fluid keep the node of the box, copy 0.
+    cells: of the parts; links: (part, part of the next cell, axis); same: pairs of parts of a cell with the same nodes.
+    Of the connected sets of parts around a node, that of the most parts keeps the node of the box, copy 0; of equal
+    ones, that of the first part. So the numbers depend on what is connected, not on how much fluid is on each side:
+    where the sides are alike, iterates would exchange them, and each exchange would be taken for other unknowns.
     """
     steps = np.array(list(product(range(3), repeat=grid.dim)))[:, ::-1]  # the first direction fastest
     size = len(steps)
@@ -53,9 +53,8 @@ def node_copies(
     index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
     counts = [2 * n + 1 for n in grid.shape]
     node = np.ravel_multi_index(tuple(np.moveaxis(2 * index[:, None] + steps, 2, 0)), counts, order="F").ravel()
-    fluid = np.bincount(group, np.repeat(share, size), len(group))
-    groups = np.unique(group)
-    order = groups[np.lexsort((groups, -fluid[groups], node[groups]))]
+    groups, members = np.unique(group, return_counts=True)
+    order = groups[np.lexsort((groups, -members, node[groups]))]
     starts = np.flatnonzero(np.diff(node[order], prepend=-1))
     rank = np.zeros(len(group), dtype=np.int64)
     rank[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))

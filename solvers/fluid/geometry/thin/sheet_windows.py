@@ -40,12 +40,15 @@ class SheetWindows:
         #: cells with fluid of each node
         self._own = sparse.csr_matrix((np.ones(len(entries[0])), entries), shape=(len(numbers), sheets.size))
         self._tables: dict[int, Indices] = {}  #: cells of the windows by layers, -1: none, -2: not computed yet
+        #: by layers, nodes from which several copies of a cell are reached: only their windows depend on the fluid
+        self._contested: dict[int, NDArray[np.bool_]] = {}
 
     def follow(self, sheets: Sheets) -> None:
         """Take sheets with the same cells, of which some have more fluid now and others less."""
         if sheets is not self._sheets:
             self._sheets, self._fluid = sheets, sheets.fluid
-            self._tables.clear()
+            for layers, contested in self._contested.items():
+                self._tables[layers][contested] = -2
 
     def nodes(self, cells: Indices) -> Indices:
         """Numbers of the nodes of cells of the mesh, the first direction slowest, shape (cells, nodes)."""
@@ -54,10 +57,14 @@ class SheetWindows:
     def cells_around(self, nodes: Indices, index: Indices, layers: int) -> tuple[Indices, NDArray[np.bool_]]:
         """(cells, whether they exist) around nodes, shape (nodes, cells); index: of the nodes in the lattice."""
         width = 2 * layers + 2
-        table = self._tables.setdefault(layers, np.full((self._count, width**self._sheets.grid.dim), -2))
+        if layers not in self._tables:
+            self._tables[layers] = np.full((self._count, width**self._sheets.grid.dim), -2)
+            self._contested[layers] = np.zeros(self._count, dtype=bool)
+        table = self._tables[layers]
         some, first = np.unique(nodes, return_index=True)
         new = table[some, 0] == -2
-        table[some[new]] = self._search(some[new], index[first[new]] // self._degree - layers - 1, layers)
+        if new.any():
+            table[some[new]] = self._search(some[new], index[first[new]] // self._degree - layers - 1, layers)
         found = table[nodes]
         return np.maximum(found, 0), found >= 0
 
@@ -81,6 +88,7 @@ class SheetWindows:
             place = (self._index[cell] - corner[row]) @ width ** np.arange(dim)[::-1]
             order = np.argsort(self._fluid[cell], kind="stable")  # of several copies the one with the most fluid
             found[row[order], place[order]] = cell[order]
+            self._contested[layers][nodes[row[found[row, place] != cell]]] = True
         return found
 
 

@@ -3,8 +3,6 @@
 New cells follow those of the box in the mesh. Faces between a new cell and its neighbour, which the ghost penalty
 integrates over, are represented by further pairs of cells, which have no other purpose. The numbers of nodes determine
 which cells share unknowns.
-Source: the rule by which 4C's cut library gives nodes several sets of unknowns: Schott, Wall, Comput. Methods Appl.
-Mech. Engrg. 276 (2014) 233-265, section 3.
 """
 
 from __future__ import annotations
@@ -25,8 +23,9 @@ from solvers.api import Array, FailureKind, Indices, Mask, StepFailed
 from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.pieces import off_boundary, without_slivers
 from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
-from solvers.fluid.geometry.thin.fluid_parts import LAYERS_AROUND, FluidParts, grown, parts_of_fluid, ragged
-from solvers.fluid.geometry.thin.sheet_nodes import Joined, node_copies, same_nodes
+from solvers.fluid.geometry.thin.fluid_parts import FluidParts, grown, parts_of_fluid, ragged
+from solvers.fluid.geometry.thin.numbering import Connections, Numbering, numbered
+from solvers.fluid.geometry.thin.sheet_nodes import Joined, same_nodes
 from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
 from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin, solid_of
 from solvers.fluid.geometry.tied_slits import slivers_of, without_slits
@@ -78,15 +77,7 @@ class Sheets:
     """
 
     grid: Grid
-    shares: dict[int, FluidShare]  #: of cells of the mesh, by their numbers in it
-    left: Indices  #: cells of the box whose fluid belongs to new cells only
-    parted: frozenset[tuple[int, int]]  #: neighbours in the box, the lower first, with no fluid on their common face
-    cells: Indices  #: number in the box of each new cell
-    pairs: int  #: how many pairs there are
-    #: number of the copy that each node of a new cell is, in the lattice of second degree; 0: the node of the box
-    copies: Indices
-    around: Mask  #: cells of the box near surfaces, where only `links` are neighbours
-    links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
+    numbering: Numbering
     fluid: Array  #: share of fluid in each cell of the mesh
     bounds: Indices  #: (cell of the mesh, facet that bounds its fluid), shape (n, 2)
     touching: Indices  #: cells of the box with fluid in which bodies touch, sorted
@@ -95,11 +86,59 @@ class Sheets:
     closed: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     repeated: tuple[int, ...] = ()  #: periodic axes: nodes at their ends are those at their beginnings
 
+    @property
+    def left(self) -> Indices:
+        """Cells of the box whose fluid belongs to new cells only, sorted."""
+        return self.numbering.left
+
+    @property
+    def parted(self) -> Indices:
+        """Neighbours in the box with no fluid on their common face, low * (cells of the box) + high, sorted."""
+        return self.numbering.parted
+
+    @property
+    def cells(self) -> Indices:
+        """Number in the box of each new cell."""
+        return self.numbering.cells
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs there are."""
+        return self.numbering.pairs
+
+    @property
+    def copies(self) -> Indices:
+        """Number of the copy that each node of a new cell is, in the lattice of second degree; 0: that of the box."""
+        return self.numbering.copies
+
+    @property
+    def around(self) -> Mask:
+        """Cells of the box near surfaces, where only `links` are neighbours."""
+        return self.numbering.around
+
+    @property
+    def links(self) -> Indices:
+        """Cells of the mesh with fluid on both sides of the face between them, shape (n, 2)."""
+        return self.numbering.links
+
     def same_unknowns(self, other: Sheets) -> bool:
         """The mesh and what is linked in it are the same, wherever the surface is in the cells."""
-        tables = ("left", "cells", "copies", "around", "links")
-        alike = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in tables)
-        return alike and self.pairs == other.pairs and self.parted == other.parted
+        return self.numbering.equal(other.numbering)
+
+    @cached_property
+    def shares(self) -> dict[int, FluidShare]:
+        """Of cells of the mesh that have a share of the fluid, by their numbers in it."""
+        found: dict[int, list[int]] = {}
+        for part, cell in zip(*(some.tolist() for some in self.of_shares), strict=True):
+            found.setdefault(cell, []).append(part)
+        return {cell: FluidShare(self.parts, tuple(parts)) for cell, parts in found.items()}
+
+    @cached_property
+    def of_shares(self) -> tuple[Indices, Indices]:
+        """(part, cell of the mesh that has it) in cells of the box whose fluid is not all in one cell of the mesh."""
+        part = self.numbering.sharing
+        cell = self.numbering.cell_of_part[part]
+        return part[cell >= 0], cell[cell >= 0]
 
     @property
     def singles(self) -> int:
@@ -114,9 +153,10 @@ class Sheets:
     @cached_property
     def successors(self) -> dict[int, list[int]]:
         """Cells of the mesh that have the fluid of a cell of the box, for those that share or lose it."""
-        found: dict[int, list[int]] = {int(cell): [] for cell in self.left}
-        for cell in self.shares:
-            found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(cell)
+        found: dict[int, list[int]] = {cell: [] for cell in self.left.tolist()}
+        have = np.unique(self.of_shares[1])
+        for cell, place in zip(have.tolist(), self.box_cells(have).tolist(), strict=True):
+            found.setdefault(place, []).append(cell)
         return found
 
     @cached_property
@@ -249,6 +289,7 @@ def find_sheets(
     joined: Joined = MappingProxyType({}),
     tied: tuple[Mask, Mask] | None = None,
     repeated: tuple[int, ...] = (),
+    before: Sheets | None = None,
 ) -> Sheets | None:
     """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin, unless `always`.
 
@@ -258,6 +299,7 @@ def find_sheets(
     no body is thin.
     joined: parts of fluid in these cells at these facets share their nodes. tied: masks of the facets that are tied and
     of those that the flow acts on; None: no body is tied. repeated: periodic axes, whose faces no body reaches.
+    before: of an earlier position, whose numbers are those of this one if the same parts are connected.
     """
     if not len(facets):
         return None
@@ -274,7 +316,7 @@ def find_sheets(
         return None
     if tied is not None:
         moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
-    parts = parts_of_fluid(grid, moments, surfaces, x)
+    parts = parts_of_fluid(grid, moments, surfaces, x, None if before is None else before.parts.geometry)
     cells, links, special = parts.cell, parts.links, parts.special
     if not len(cells) and not always:  # all surfaces are outside of the box
         return None
@@ -287,50 +329,29 @@ def find_sheets(
         ):
             return None
     _require_off_ends(grid, special, repeated)
-    copies = node_copies(grid, cells, parts.share, links, same_nodes(parts, joined), special)
-    moved = (copies > 0).any(axis=1)
-    linked = np.zeros(len(cells), dtype=bool)
-    linked[links[:, :2]] = True
-    new = np.flatnonzero(moved & linked)  # fluid that is enclosed within one cell counts as solid
-    shares = {grid.size + k: FluidShare(parts, (n,)) for k, n in enumerate(new.tolist())}
-    touching = np.zeros(grid.size, dtype=bool)
-    touching[parts.touching] = True
-    sharing = touching.copy()
-    sharing[cells[moved]] = True
-    staying: dict[int, list[int]] = {cell: [] for cell in np.flatnonzero(sharing).tolist()}
-    for number in np.flatnonzero(sharing[cells] & ~moved).tolist():
-        staying[int(cells[number])].append(number)
-    shares |= {cell: FluidShare(parts, tuple(kept)) for cell, kept in staying.items() if kept}
-    left = np.array([cell for cell, kept in staying.items() if not kept], dtype=np.int64)
-    cell_of = np.where(moved, -1, cells)
-    cell_of[new] = grid.size + np.arange(len(new))
-    ends = links[:, :2]
-    linked_cells, changed = cell_of[ends], moved[ends].any(axis=1)
-    passing = set(map(tuple, cells[ends[~changed]].tolist()))
-    adjacent = _neighbours(grid, np.unique(cells[~moved]))
-    at_faces = ends[changed & special[cells[ends]].any(axis=1)]
-    fluid = np.concatenate([np.clip(1.0 - moments.fraction, 0.0, 1.0), np.zeros(len(new) + 2 * len(at_faces))])
-    fluid[sharing.nonzero()] = 0.0
-    for number, share in shares.items():
-        fluid[number] = share.fraction
+    connections = Connections(cells, links, special, parts.touching, same_nodes(parts, joined))
+    known = before is not None and before.numbering.of.equal(connections)
+    numbering = before.numbering if before is not None and known else numbered(grid, connections)
     part, facet = parts.pieces.T
-    members = np.concatenate([new, at_faces.ravel()])
+    of_mesh = numbering.cell_of_part[part]
     return Sheets(
         grid,
-        shares,
-        left,
-        frozenset(adjacent - passing),
-        cells[members],
-        len(at_faces),
-        copies[members],
-        grown(grid, special, LAYERS_AROUND),
-        np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
-        fluid,
-        np.column_stack([cell_of[part], facet])[cell_of[part] >= 0],
+        numbering,
+        _fluid(grid, moments.fraction, parts, numbering),
+        np.column_stack([of_mesh, facet])[of_mesh >= 0],
         np.intersect1d(parts.touching, cells),
         parts,
         repeated=repeated,
     )
+
+
+def _fluid(grid: Grid, solid: Array, parts: FluidParts, numbering: Numbering) -> Array:
+    """Share of fluid in each cell of the mesh; solid: share of solid in each cell of the box."""
+    found = np.concatenate([np.clip(1.0 - solid, 0.0, 1.0), np.zeros(len(numbering.cells))])
+    found[parts.touching] = found[parts.cell[numbering.sharing]] = 0.0
+    part = numbering.sharing[numbering.cell_of_part[numbering.sharing] >= 0]
+    np.add.at(found, numbering.cell_of_part[part], parts.share[part])
+    return found
 
 
 def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
@@ -374,16 +395,6 @@ def _is_thin(grid: Grid, cells: Indices, links: Indices, facing: Array, close: I
             return True
         number[near] = -1
     return False
-
-
-def _neighbours(grid: Grid, cells: Indices) -> set[tuple[int, int]]:
-    """Pairs of these cells with a common face, the lower first."""
-    found: set[tuple[int, int]] = set()
-    index, members = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1), set(cells.tolist())
-    for axis, count in enumerate(grid.shape):
-        stride = int(np.prod(grid.shape[:axis]))
-        found |= {(c, c + stride) for c, i in zip(cells.tolist(), index[:, axis], strict=True) if i + 1 < count}
-    return {pair for pair in found if pair[1] in members}
 
 
 def _require_off_ends(grid: Grid, special: Mask, repeated: tuple[int, ...]) -> None:

@@ -80,21 +80,17 @@ def _line(edge: Array, points: Array, at: Array, begins: Array) -> tuple[Array, 
 
 def _segments(x: Array, triangles: Facets, axis: int, place: float) -> Array:
     """Segments in which triangles cut a plane, with solid on their left, shape (triangles, 2 ends, 2 directions)."""
-    others = [i for i in range(3) if i != axis]
-    ends = np.empty((len(triangles), 2, 2))
-    for row, triangle in enumerate(triangles):
-        found = []
-        for i, j in ((0, 1), (1, 2), (2, 0)):
-            a, b = np.sort(triangle[[i, j]])  # the same point for both triangles at the edge
-            if (x[a, axis] > place) != (x[b, axis] > place):
-                share = (place - x[a, axis]) / (x[b, axis] - x[a, axis])
-                found.append((x[a] + share * (x[b] - x[a]))[others])
-        first, second = found
-        normal = np.cross(x[triangle[1]] - x[triangle[0]], x[triangle[2]] - x[triangle[0]])[others]
-        along = second - first
-        leftward = along[1] * normal[0] - along[0] * normal[1] < 0.0
-        ends[row] = (second, first) if leftward else (first, second)
-    return ends
+    others, corners = [i for i in range(3) if i != axis], x[triangles]
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)  # the same point for both triangles at the edge
+    above = x[edges, axis] > place
+    row, edge = np.nonzero(above[..., 0] != above[..., 1])  # two edges of each triangle
+    a, b = np.moveaxis(x[edges[row, edge]], 1, 0)
+    share = (place - a[:, axis]) / (b[:, axis] - a[:, axis])
+    ends = (a + share[:, None] * (b - a))[:, others].reshape(-1, 2, 2)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, others]
+    along = ends[:, 1] - ends[:, 0]
+    leftward = along[:, 1] * normal[:, 0] - along[:, 0] * normal[:, 1] < 0.0
+    return np.where(leftward[:, None, None], ends[:, ::-1], ends)
 
 
 def _plane(edges: list[Array], points: Array, x: Array, segments: Facets) -> tuple[Array, Array]:
