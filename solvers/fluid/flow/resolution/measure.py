@@ -8,7 +8,7 @@ change the velocity by U linearly,
 U the largest velocity relative to the body within half of its extent around it. Gaps count by what acts there: the
 share of the force in them is the part of int |t - t_0 n| dS over the surface that lies in front of another wall, within
 `NARROW` cells and the extent of the body; t is the traction and t_0 the median of its normal part, which the level of
-the pressure changes. Force on the rest of the body that nothing there explains is that of a film whose friction balances
+the pressure changes. Force on the rest of the body that nothing there explains is that of a film whose friction holds
 it: a plug that squeezes fluid through the gaps beside it.
 """
 
