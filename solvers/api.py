@@ -35,6 +35,7 @@ class FailureKind(Enum):
     INVERTED = "inverted"  #: an element is inside out
     LINEAR_SOLVER = "linear solver"  #: an iterative linear solver stalls
     MOTION = "motion"  #: a body moves or turns too far in one step
+    DIVERGED = "diverged"  #: an iterate has a body where its motion does not bring it
     COARSE_CELLS = "coarse cells"  #: a body is close to cells that are not of the finest level
     PERIODIC_FACES = "periodic faces"  #: a body reaches the end of the period
     NO_ROOM = "no room"  #: no motion of rigid bodies opens all of their overlaps

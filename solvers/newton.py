@@ -187,6 +187,18 @@ def converge(system: System, tolerance: Tolerance) -> StepInfo:
     Residuals of parts whose last residual is rounding error are not reported.
     """
     history: list[Array] = []
+    try:
+        return _converge(system, tolerance, history)
+    except NoResidual as lost:
+        if lost.history or not history:
+            raise
+        norms = _norms(history, np.ones(len(history[0]), dtype=bool))
+        number, where = len(history), lost.where
+        raise NoResidual(lost.field, lost.kind, lost.reason, iteration=number, where=where, history=norms) from None
+
+
+def _converge(system: System, tolerance: Tolerance, history: list[Array]) -> StepInfo:
+    """The same; history: gets the residuals of the iterates."""
     for iterate in iterates(system, tolerance):
         history.append(iterate.residual)
         if not np.isfinite(iterate.residual).all():

@@ -41,6 +41,7 @@ OF_KIND: dict[FailureKind, tuple[str, ...]] = {
     FailureKind.MOTION: (
         f"{SHORTER}: a body should cross less than two cells in a step, and turn by less than 180 degrees",
     ),
+    FailureKind.DIVERGED: (SHORTER, SMOOTH_LOADS),
     FailureKind.COARSE_CELLS: ("fluid.grid.refine: a box that holds the body wherever it goes",),
     FailureKind.PERIODIC_FACES: ("a longer box, or an earlier time.end",),
     FailureKind.NO_ROOM: ("room for the bodies: one that is free or softer, or motions that leave a gap",),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from advised import require_advice
 from fluid_setup import (
+    BOX,
     block,
     body,
     circle,
@@ -21,6 +22,8 @@ from fluid_setup import (
 
 from solvers.api import FailureKind, StepFailed
 from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
 from solvers.fluid.terms.boundary.patches import Patch
 
 STILL = field(0, 0)
@@ -148,3 +151,32 @@ def test_body_that_outruns_the_flow_behind_it_is_named():
     with pytest.raises(StepFailed, match="cells in one step") as failed:
         step(fluid, 0.01, 0.01)
     require_advice(failed.value, FailureKind.MOTION)
+
+
+@pytest.mark.parametrize(("thin", "velocity"), [(False, 0.0), (True, 0.0), (True, 30.0)])
+def test_an_iterate_far_from_its_velocity_has_diverged(thin, velocity):
+    """Another field moves a body by six cells, which a velocity of six cells per step explains.
+
+    With it, strips of cells behind a thick body would be as wide.
+    """
+    points, facets = block([0.3, -0.1], [0.31, 1.1]) if thin else (circle((0.3, 0.5), 0.22, 40), loop(40))
+    fluid = make_fluid(
+        uniform([0, 0], [1, 1], [20, 20]), [Patch("box", BOX[2], "outflow")],
+        [ImmersedBody(ImmersedSurface("body", facets, len(points)), None, start=points)], dt=0.01,
+    )  # fmt: skip
+    still, moving = np.zeros_like(points), np.tile([velocity, 0.0], (len(points), 1))
+    fluid.move({"body": Motion(points, still)})
+    fluid.begin_step(0.0, 0.01)
+    fluid.move({"body": Motion(points, moving)})
+    fluid.solve()
+    fluid.end_step()
+    fluid.begin_step(0.01, 0.01)
+    words = (
+        "body 'body' moved by 6 cells in one step; velocities are extrapolated to"
+        if velocity
+        else "an iterate had body 'body' 6 cells from where the step began, of which its velocity explains 0: "
+        "the iteration diverged, or the load of the step is too sudden; velocities are extrapolated to"
+    )
+    with pytest.raises(StepFailed, match=words) as failed:
+        fluid.move({"body": Motion(points + np.array([0.3, 0.0]), still)})
+    require_advice(failed.value, FailureKind.MOTION if velocity else FailureKind.DIVERGED)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from advised import require_advice
 
-from solvers.api import FailureKind, StepFailed
+from solvers.api import FailureKind, NoResidual, StepFailed
 from solvers.newton import ENOUGH, Tolerance, converge, enough, iterates
 
 
@@ -119,6 +119,21 @@ def test_not_a_number_is_named():
     with pytest.raises(StepFailed, match="the residual is not a number at iteration 1") as e:
         converge(Scalar(lambda x: x if x == 1 else math.nan, lambda x: 2.0, 1.0), Tolerance())
     require_advice(e.value, FailureKind.NOT_FINITE)
+
+
+def test_an_iterate_without_a_residual_has_its_number():
+    """What a field says of it comes with the residuals before."""
+
+    class Bounded(Scalar):
+        def follow(self):
+            if self.x < -3.0:
+                raise NoResidual("field", FailureKind.DIVERGED, "beyond -3", where=(self.x,))
+
+    for start, number in ((2.0, 1), (-4.0, 0)):  # from 2 to -3.5
+        with pytest.raises(NoResidual, match=f"field: beyond -3 at iteration {number} near") as e:
+            converge(Bounded(math.atan, lambda x: 1 / (1 + x * x), start), Tolerance())
+        require_advice(e.value, FailureKind.DIVERGED)
+        assert e.value.history == pytest.approx((math.atan(2.0),) * number)
 
 
 def test_round_off_is_good_enough():

@@ -70,7 +70,11 @@ def require_history(fluid: FlowInMotion, cut: Cut, missing: NDArray[np.bool_]) -
 
 
 def moved_too_far(fluid: FlowInMotion, cells: int, place: tuple[float, ...] | None = None) -> NoResidual:
-    """The failure of a step in which a body moved by more than some cells, or else fluid appears at a place [m]."""
+    """The failure of a step in which a body moved by more than some cells, or else fluid appears at a place [m].
+
+    A body that another field moves is where an iterate has it. Its velocity when the step began says whether it moves
+    as far, or the iteration diverges.
+    """
     assert fluid.began is not None
     ways = [
         np.abs(now.x - before.x).max(axis=1) if len(before.x) else np.zeros(1)
@@ -84,14 +88,22 @@ def moved_too_far(fluid: FlowInMotion, cells: int, place: tuple[float, ...] | No
         return NoResidual(
             "fluid", FailureKind.MOTION, f"{reason}: take a smaller time step, or finer cells there", where=place
         )
-    vertex = int(ways[farthest].argmax())
+    body, vertex = fluid.moving.bodies[farthest], int(ways[farthest].argmax())
+    name, at = body.surface.name, tuple(fluid.moving.motions[farthest].x[vertex].tolist())
+    fastest = float(np.linalg.norm(fluid.began.motions[farthest].v, axis=1).max(initial=0.0))
+    own = fastest * fluid.current.dt / fluid.smallest_cell
+    if body.motion is None and own <= cells:
+        reason = (
+            f"an iterate had body '{name}' {way:.3g} cells from where the step began, of which its velocity explains "
+            f"{own:.2g}: the iteration diverged, or the load of the step is too sudden; velocities are extrapolated to "
+            f"{cells} behind its surface"
+        )
+        return NoResidual("fluid", FailureKind.DIVERGED, reason, where=at)
     reason = (
-        f"body '{fluid.moving.bodies[farthest].surface.name}' moved by {way:.3g} cells in one step; velocities are "
+        f"body '{name}' moved by {way:.3g} cells in one step; velocities are "
         f"extrapolated to {cells} behind its surface: take a time step below {fluid.current.dt * cells / way:.2g}"
     )
-    return NoResidual(
-        "fluid", FailureKind.MOTION, reason, where=tuple(fluid.moving.motions[farthest].x[vertex].tolist())
-    )
+    return NoResidual("fluid", FailureKind.MOTION, reason, where=at)
 
 
 def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:

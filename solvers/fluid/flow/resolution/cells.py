@@ -15,7 +15,7 @@ class GapCells:
     least: float  #: cells at the narrowest place
     along: float  #: along the film, from edge to edge; without edges along the part of it in which the force acts
     ends: bool  #: it ends at edges
-    share: float  #: of the force on the body, as far as a flow explains it
+    share: float  #: of the force on the body, as far as a flow explains it; also what its pressure makes elsewhere
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ change the velocity by U linearly,
 U the largest velocity relative to the body within half of its extent around it. Gaps count by what acts there: the
 share of the force in them is the part of int |t - t_0 n| dS over the surface that lies in front of another wall, within
 `NARROW` cells and the extent of the body; t is the traction and t_0 the median of its normal part, which the level of
-the pressure changes.
+the pressure changes. Force on the rest of the body that nothing there explains is that of a film whose friction holds
+it: a plug that squeezes fluid through the gaps beside it.
 """
 
 from __future__ import annotations
@@ -17,16 +18,26 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.resolution.cells import BodyCells
-from solvers.fluid.flow.resolution.shape import SurfaceScene, is_narrow, present, scene_of, shape_of, walls_of_box
+from solvers.fluid.flow.resolution.shape import (
+    SurfaceScene,
+    films_of,
+    is_narrow,
+    present,
+    scene_of,
+    shape_of,
+    walls_of_box,
+)
 from solvers.mesh.tessellation import unit_normals
 
 #: Force that friction and dynamic pressure may explain, in multiples of them, around bodies and in films. Around bodies
 #: friction is a third of the drag or more, else dynamic pressure counts; in films the pressure is by their length over
-#: their height larger. What is more is weight or inertia of the fluid, which needs no boundary layer.
+#: their height larger. What is more around bodies comes from films, as far as their pressure drop explains it, else it
+#: is weight or inertia of the fluid, which needs no boundary layer.
 AROUND_BODIES, IN_FILMS = 3.0, 100.0
 
 
@@ -56,12 +67,31 @@ def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Ar
     free = (scene.owner[samples.facet] == body) & ~is_narrow(scene, body)
     around = AROUND_BODIES * float(of_flow[free].sum()) / max(float(all_of_it[free].sum()), 1e-300)
     counts = np.where(free, min(1.0, around) * all_of_it, np.minimum(all_of_it, IN_FILMS * of_flow))
-    found = shape_of(scene, body, all_of_it, counts)
-    area, drag = scene.of_samples(wet)[free], float(scene.of_samples(shear)[free].sum())
+    area, friction = scene.of_samples(wet), scene.of_samples(shear)
+    rest, drag = float((all_of_it - counts)[free].sum()), float(friction[free].sum())
+    drops = {film: pressure_drop(scene, here, friction) for film, here in films_of(scene, body).items()}
+    beyond = {film: min(rest, drop * float(area[free].sum())) for film, drop in drops.items()}
+    found = shape_of(scene, body, all_of_it, counts, beyond)
     if drag == 0.0:
         return replace(found, layer=np.inf)
-    across = float((area / samples.across[free]).sum())  # the area in cells along the normal
+    across = float((area / samples.across)[free].sum())  # the area in cells along the normal
     return replace(found, layer=fluid.settings.viscosity * speed * across / drag)
+
+
+def pressure_drop(scene: SurfaceScene, film: NDArray[np.int64], friction: Array) -> float:
+    """Pressure [Pa] that friction at the walls of a film balances from one of its ends to the other.
+
+    The gradient is G = 2 tau / g in a gap g under the shear stress tau. In the plane the drop is int G ds; in space the
+    film is taken for a square as large as where the gradient is: sqrt(int G^2 dA).
+
+    film: its samples; friction: forces [N] at all samples.
+    """
+    samples = scene.samples
+    area, gap = samples.area[film], np.maximum(scene.gaps.cells[film], 1e-6) * samples.across[film]
+    gradient = 2.0 * friction[film] / (area * gap)
+    if scene.corners.shape[2] == 2:
+        return float((gradient * area).sum())
+    return float(np.sqrt((gradient**2 * area).sum()))
 
 
 def _home(fluid: Fluid, x: Array) -> Array:

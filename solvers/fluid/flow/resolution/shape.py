@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,14 +97,20 @@ def present(scene: SurfaceScene) -> list[int]:
     return found
 
 
-def shape_of(scene: SurfaceScene, body: int, acting: Array, counts: Array) -> BodyCells:
-    """Of one body; acting: size of the force at each sample; counts: the part of it that shares are of."""
+def shape_of(
+    scene: SurfaceScene, body: int, acting: Array, counts: Array, beyond: Mapping[int, float] | None = None
+) -> BodyCells:
+    """Of one body; acting: size of the force at each sample; counts: the part of it that shares are of.
+
+    beyond: forces outside of films that they cause, by what is opposite; what several cause counts for each.
+    """
     samples = scene.samples
     some = np.flatnonzero(scene.owner[samples.facet] == body)
     corners = scene.corners[np.unique(samples.facet[some])]
     per_length = _per_length(scene, some)
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
-    share = counts / max(float(acting[some].sum()), 1e-300)
+    whole = max(float(acting[some].sum()), 1e-300)
+    share, caused = counts / whole, {film: force / whole for film, force in (beyond or {}).items()}
     narrow = is_narrow(scene, body)[some]
     return BodyCells(
         scene.bodies[body],
@@ -113,7 +119,7 @@ def shape_of(scene: SurfaceScene, body: int, acting: Array, counts: Array) -> Bo
         sharp=bool(scene.sharp[body]),
         facets=float(1.0 / (edge * per_length)),
         share=float(share[some[~narrow]].sum()),
-        gaps=tuple(_gaps_of(scene, some, narrow, share)),
+        gaps=tuple(_gaps_of(scene, body, share, caused)),
     )
 
 
@@ -139,20 +145,30 @@ def _per_length(scene: SurfaceScene, some: NDArray[np.int64]) -> float:
     return float(np.average(1.0 / scene.samples.across[some], weights=scene.samples.area[some]))
 
 
-def _gaps_of(
-    scene: SurfaceScene, some: NDArray[np.int64], narrow: NDArray[np.bool_], share: Array
-) -> Iterator[GapCells]:
-    """Gaps in front of the samples of a body, by what is opposite. Planes of symmetry double what films cover.
+def films_of(scene: SurfaceScene, body: int) -> dict[int, NDArray[np.int64]]:
+    """Samples of a body in front of narrow gaps, by what is opposite: a body, or the number of bodies + a face."""
+    some = np.flatnonzero((scene.owner[scene.samples.facet] == body) & is_narrow(scene, body))
+    opposite = _opposite(scene, some)
+    return {other: some[opposite == other] for other in np.unique(opposite).tolist()}
 
-    narrow: of these samples.
+
+def _opposite(scene: SurfaceScene, some: NDArray[np.int64]) -> NDArray[np.int64]:
+    """What is opposite of samples, as in `films_of`."""
+    partner = scene.gaps.partner[some]
+    of_bodies = scene.owner[scene.samples.facet[np.maximum(partner, 0)]]
+    return np.where(partner < 0, len(scene.bodies) - 1 - partner, of_bodies)
+
+
+def _gaps_of(scene: SurfaceScene, body: int, share: Array, caused: Mapping[int, float]) -> Iterator[GapCells]:
+    """Gaps of a body, by what is opposite. Planes of symmetry double what films cover.
+
+    share: of the force on the body, at each sample; caused: the same outside of the film, by what is opposite.
     """
     samples, gap, names = scene.samples, scene.gaps.cells, [*scene.bodies, *scene.faces]
-    narrow, some = narrow[np.isfinite(gap[some])], some[np.isfinite(gap[some])]
-    partner = scene.gaps.partner[some]
-    of_bodies = scene.owner[samples.facet[np.maximum(partner, 0)]]
-    opposite = np.where(partner < 0, len(scene.bodies) - 1 - partner, of_bodies)
-    for other in np.unique(opposite[narrow]).tolist():
-        facing, here = some[opposite == other], some[(opposite == other) & narrow]
+    faced = np.flatnonzero((scene.owner[samples.facet] == body) & np.isfinite(gap))
+    opposite = _opposite(scene, faced)
+    for other, here in films_of(scene, body).items():
+        facing = faced[opposite == other]
         weight, cells = share[here], np.maximum(gap[here], 1e-6)
         total, least = float(weight.sum()), float(cells.min())
         mean = float(np.exp((weight * np.log(cells)).sum() / total)) if total > 0.0 else least
@@ -164,8 +180,7 @@ def _gaps_of(
             along = float((copies * samples.covers[here].sum()) ** (1.0 / (scene.corners.shape[2] - 1)))
         else:
             along = cells_along(gap[facing], copies * samples.covers[facing], samples.normal[facing])
-        body = scene.bodies[scene.owner[samples.facet[here[0]]]]
-        yield GapCells(body, names[other], mean, least, along, ends, total)
+        yield GapCells(scene.bodies[body], names[other], mean, least, along, ends, total + caused.get(other, 0.0))
 
 
 def _mirrors_at(scene: SurfaceScene, some: NDArray[np.int64]) -> int:
