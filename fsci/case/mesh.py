@@ -34,7 +34,7 @@ class FileMesh(PlacedMesh):
     order: Order = setting(
         "auto",
         "polynomial order of the cells (.geo, and with 'thickness'; other files have theirs); auto: 2 for an elastic "
-        "body that is slender, so that it bends, and in no contact but ties, else 1",
+        "body that is slender, so that it bends, unless it may touch in a flow, else 1",
     )
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
     size_factor: Positive = setting(

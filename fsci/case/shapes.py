@@ -78,8 +78,8 @@ class ShapeSection(PlacedMesh):
     takes: ClassVar[Mapping[str, Takes]]
     order: Order = setting(
         "auto",
-        "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, and in "
-        "no contact but ties, else 1",
+        "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, unless it "
+        "may touch something in a flow, else 1",
     )
     if TYPE_CHECKING:
         shape: str

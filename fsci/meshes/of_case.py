@@ -76,7 +76,8 @@ def read_body(case: Case, name: str) -> Mesh:
     try:
         mesh = _elastic_mesh(case, name, settings.mesh)
         _require_dimension(case, name, mesh)
-        if chooses_order(settings.mesh) and not _may_touch(case, name) and is_slender(mesh):
+        # bodies that may touch in a flow have first order: there second order has not been shown to be tight
+        if chooses_order(settings.mesh) and name not in bodies_that_may_touch(case) and is_slender(mesh):
             mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
@@ -102,21 +103,6 @@ def is_meshed_here(mesh: MeshSection) -> bool:
 def chooses_order(mesh: MeshSection) -> bool:
     """Whether the program chooses the order of the cells of an elastic body."""
     return mesh.order == "auto" and is_meshed_here(mesh)
-
-
-def _may_touch(case: Case, name: str) -> bool:
-    """Whether a body may be in contact that is no tie.
-
-    First order is more robust in contact, where second-order surfaces are clipped as linear parts, and the kinks
-    between them make the active set change.
-    """
-    if case.coupling is not None:
-        return name in bodies_that_may_touch(case)
-    if case.contact is None:
-        return False
-    named = case.elastic_bodies if case.contact.bodies == "all" else case.contact.bodies or ()
-    pairs = [pair for pair in case.contact.pairs.values() if not pair.tied]
-    return name in named or any(side.body == name for pair in pairs for _, side in pair.sides)
 
 
 def degree_of_cells(case: Case, name: str) -> int:

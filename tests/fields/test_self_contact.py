@@ -195,7 +195,7 @@ time: {step: 0.1, end: 1}
 structure:
   bodies:
     c:
-      mesh: {shape: ring, inner_radius: 0.8, outer_radius: 1.0, angle: 350, start: 5, cells: [48, 3]}
+      mesh: {shape: ring, inner_radius: 0.8, outer_radius: 1.0, angle: 350, start: 5, cells: [48, 3], order: 1}
       material: {law: neo_hooke, E: 100, nu: 0.3}
       supports:
         - {at: [-1, 0], displacement: [0, 0]}
