@@ -5,12 +5,13 @@ Fixed and driven rigid bodies may overlap anything and reach beyond the box: the
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.closed_faces import closed_faces
 from fsci.builder.periods import periods
 from fsci.case import Case
 from fsci.case.contact import PairSection
@@ -107,6 +108,7 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
             yield body.keys, "the body is outside of the fluid's box"
         if not body.moves or outside or body.name in dry:
             continue
+        yield from _behind_walls(case, body, symmetric)
         for face in symmetric:
             axis = "xyz".index(face[0])
             beyond = low[axis] - x_low[axis] if face[1] == "-" else x_high[axis] - high[axis]
@@ -116,6 +118,21 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
             remedy = "cut the mesh there" if not body.elastic else "cut the mesh there and give it 'symmetry: true'"
             length = f"{beyond:.3g} {case.units.length}"
             yield body.keys, f"the body reaches {length} beyond the plane of symmetry '{face}': {counts}; {remedy}"
+
+
+def _behind_walls(case: Case, body: Placed, symmetric: Sequence[str]) -> Iterator[Said]:
+    """Free rigid bodies that are behind walls at the start; a pivot there is a hinge."""
+    free = (case.rigid or {}).get(body.name)
+    if body.elastic or free is None or free.pivot is not None:
+        return
+    for wall in closed_faces(case):
+        depth = float(wall.depth(body.mesh.points).max())
+        if depth > 1e-6 * body.extent and wall.face not in symmetric:
+            length = f"{depth:.3g} {case.units.length}"
+            yield (
+                body.keys,
+                f"the free body reaches {length} behind the wall '{wall.face}', which does not hold it there",
+            )
 
 
 def _driven(case: Case, name: str) -> bool:

@@ -26,6 +26,7 @@ from fsci.plot.units import unit_of
 from fsci.running.files import write_text
 
 POINTS = 201  #: of a line by default
+SHEAR = "wall_shear_stress"
 Array = NDArray[np.float64]
 Table = dict[str, Array]  #: name of a column -> values
 
@@ -74,9 +75,36 @@ def plot_surface(
         mesh = _derived(import_pyvista().read(files[body]), fields)
         points, s = surface_points(mesh)
         x = np.asarray(mesh.points)[points]
-        along = {} if s is None else {"s": s}
-        tables.append({**along, **_coordinates(x), **_columns(mesh.point_data, points)})
+        columns = _columns(mesh.point_data, points)
+        if s is not None:
+            columns = {"s": s, **columns, **_along(columns, points, x)}
+        tables.append({**_coordinates(x), **columns})
     return _write(folder, f"surface_{body}", moments, tables, fields, units)
+
+
+def _along(columns: Table, points: NDArray[np.int64], x: Array) -> Table:
+    """The shear stress along outlines, as column wall_shear_stress.s: it changes its sign where a flow separates."""
+    if f"{SHEAR}.x" not in columns:
+        return {}
+    directions = np.concatenate([tangents(x[loop]) for loop in loops_of(points)])
+    return {f"{SHEAR}.s": sum(columns[f"{SHEAR}.{axis}"] * directions[:, k] for k, axis in enumerate("xy"))}
+
+
+def loops_of(points: NDArray[np.int64]) -> list[slice]:
+    """Parts of a sequence of outlines, each of which ends with its first point."""
+    found, start = [], 0
+    for end in range(1, len(points)):
+        if end > start and points[end] == points[start]:
+            found.append(slice(start, end + 1))
+            start = end + 1
+    return found + ([slice(start, len(points))] if start < len(points) else [])
+
+
+def tangents(x: Array) -> Array:
+    """Unit vectors along a closed line at its points, from the one before to the one after, shape (n, 3)."""
+    around = np.concatenate([x[-2:-1], x, x[1:2]])
+    across = around[2:] - around[:-2]
+    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None])
 
 
 def name_of(file: Path) -> str:
@@ -180,14 +208,16 @@ def _draw(
         unit = field_unit(field, (0.0, max(sizes)), units)
         s = {times[i]: tables[i]["s"] * length.factor for i in shown}
         named = {f"t = {time:.4g} {units['time']}": (s[time], values * unit.factor) for time, values in curves.items()}
-        text = unit.beside(field.replace(".", " ") if field in tables[0] else f"|{field}|")
+        along = f"{field}.s" in tables[0]
+        text = unit.beside(f"{field} along s" if along else field if field in tables[0] else f"|{field}|")
         drawn.append(plot_lines(folder / f"{stem}_{field}.png", {text: named}, length.beside("s")))
     return drawn
 
 
 def _values(table: Table, field: str) -> Array | None:
-    """A column, or the size of a field from its components."""
-    if field in table:
-        return table[field]
+    """A column, along s where there is one, or the size of a field from its components."""
+    for column in (f"{field}.s", field):
+        if column in table:
+            return table[column]
     parts = {name.rpartition(".")[2]: values for name, values in table.items() if name.rpartition(".")[0] == field}
     return component_of({field: np.stack(list(parts.values()), axis=1)}, field) if parts else None

@@ -1,10 +1,12 @@
 """Tables along lines and surfaces: exact for linear fields, nan where nothing is, in the order of the outline."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fsci.cli import execute
-from fsci.plot.along import read_line
+from fsci.plot.along import loops_of, read_line
 from fsci.plot.picture import plot_run
 from fsci.running.output import FieldWriter
 from fsci.running.results_folder import PICTURE_LIST
@@ -121,6 +123,18 @@ def test_the_surface_of_a_rigid_body(tmp_path):
     assert found["s"] == pytest.approx(edge * np.arange(25))
     assert found["traction.x"] == pytest.approx(-(found["x"] - 0.5) / 0.25)
     assert set((out / "pictures" / PICTURE_LIST).read_text().split()) == set(names)
+
+
+def test_shear_along_a_surface_has_a_sign(tmp_path):
+    """A shear along x over a ring: forwards along s below, where s runs to the right, backwards above."""
+    disc = ring()
+    shear = np.zeros((len(disc.points), 3))
+    shear[:, 0] = 2.0
+    disc = replace(disc, point_data={**disc.point_data, "wall_shear_stress": shear})
+    found = table(plot_run(written(tmp_path, [flow_of(2), disc]), surfaces=["disc"], field="wall_shear_stress")[0])
+    assert found["wall_shear_stress.s"] == pytest.approx(-2.0 * (found["y"] - 0.5) / 0.25, abs=1e-12)
+    two = np.array([3, 4, 5, 3, 7, 8, 9, 7])
+    assert [(loop.start, loop.stop) for loop in loops_of(two)] == [(0, 4), (4, 8)]
 
 
 def test_the_surface_of_an_elastic_body_goes_over_midnodes(tmp_path):

@@ -291,8 +291,17 @@ def test_bodies_beyond_a_plane_of_symmetry():
         "case.yaml:8:5: the body reaches 0.2 m beyond the plane of symmetry 'x-': it counts with all of its"
     )
     driven = without(FREE, "coupling").replace("free: {density: 2}", "motion: {displacement: [0, 0.1*t]}")
-    for text in (FREE.replace("0.1, 0.5]", "0.4, 0.5]"), FREE.replace("symmetry: true", "slip: true"), driven):
+    for text in (FREE.replace("0.1, 0.5]", "0.4, 0.5]"), driven):
         assert warnings(text) == ([], [])
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_free_bodies_behind_walls():
+    """A pivot makes it a hinge, which may be in the wall."""
+    behind = FREE.replace("symmetry: true", "slip: true")
+    [said], _ = warnings(behind)
+    assert said == "case.yaml:8:5: the free body reaches 0.2 m behind the wall 'x-', which does not hold it there"
+    assert warnings(behind.replace("density: 2", "density: 2, pivot: [0, 0.5]")) == ([], [])
 
 
 @pytest.mark.usefixtures("in_new_folder")
