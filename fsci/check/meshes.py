@@ -137,8 +137,10 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
     for only_note, keys, text in overlaps(case, bodies, found.pairs):
         (found.notes if only_note else found.warnings).append(f"{case.place(*keys)}: {text}")
     if case.fluid is not None:
+        from fsci.check.impulsive import impulsive
         from fsci.check.resolution import coarse
 
+        found.notes += list(impulsive(case))
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in coarse(case, bodies)]
     if case.elastic_bodies:
         from fsci.builder.elements import choose_element
