@@ -26,7 +26,7 @@ TILT = 0.1
 
 #: Overlap at the start of a step, relative to the extent of the smaller body, from which on edges do not touch: they
 #: are on the sides of the bodies that look away. The overlap of a solution is rounding, and bodies are thicker: from
-#: 1e-7 to 1e-2 the same motions are the same.
+#: 1e-7 to 1e-2 those motions are the same.
 FAR_BEHIND = 1e-4
 
 
