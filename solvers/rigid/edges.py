@@ -20,13 +20,14 @@ from solvers.api import Array
 SINE = 1e-6
 
 #: What a normal may miss of those at an edge, as a sine. A body that lies on two edges tilts in an iterate, and away
-#: from one of them; without this it would not be seen until the body has turned into it. Solutions do not depend on it.
+#: from one of them; without this it would not be seen until the body has turned into it. From 0.01 to 1 motions of a
+#: stack of bars that falls are the same.
 TILT = 0.1
 
 #: Overlap at the start of a step, relative to the extent of the smaller body, from which on edges do not touch: they
 #: are on the sides of the bodies that look away. The overlap of a solution is rounding, and bodies are thicker: from
-#: 1e-6 to 1e-2 results are the same.
-BEHIND = 1e-4
+#: 1e-7 to 1e-2 those motions are the same.
+FAR_BEHIND = 1e-4
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Edges:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedEdges:
     """Some edges of a surface at one time."""
 
     number: NDArray[np.int64]  #: among those of the surface, shape (k,)
@@ -72,7 +73,7 @@ class Placed:
     @classmethod
     def within(
         cls, edges: Edges, x: Array, facets: NDArray[np.int64], box: tuple[Array, Array], margin: float
-    ) -> Placed:
+    ) -> PlacedEdges:
         """Those near a box; x: vertices of the surface [m]; facets: those of the surface."""
         beyond = np.concatenate([x < box[0] - margin, x > box[1] + margin], axis=1) @ (1 << np.arange(6))
         one_end, other_end = edges.ends.T
@@ -88,8 +89,8 @@ class Placed:
         inwards_beside = np.where(rim, -n, np.cross(along, beside))
         return cls(number, ends[:, 0], along, length, np.stack([inwards, inwards_beside], axis=1), n + beside)
 
-    def __getitem__(self, which: NDArray) -> Placed:
-        return Placed(
+    def __getitem__(self, which: NDArray) -> PlacedEdges:
+        return PlacedEdges(
             self.number[which],
             self.first[which],
             self.along[which],
@@ -107,8 +108,8 @@ class Placed:
 class Crossings:
     """Pairs of edges that cross, shape (m,)."""
 
-    one: Placed  #: the edge of the body
-    other: Placed  #: that of the surface
+    one: PlacedEdges  #: the edge of the body
+    other: PlacedEdges  #: that of the surface
     gap: Array  #: [m]
     normal: Array  #: unit vectors from the surface to the body, shape (m, 3)
     at: Array  #: points on the edges of the body [m], shape (m, 3)
@@ -117,7 +118,7 @@ class Crossings:
         return Crossings(self.one[which], self.other[which], self.gap[which], self.normal[which], self.at[which])
 
 
-def crossings(one: Placed, other: Placed, margin: float, deepest: float) -> Crossings:
+def crossings(one: PlacedEdges, other: PlacedEdges, margin: float, deepest: float) -> Crossings:
     """The pairs whose gap is between -deepest and margin [m], and less than the longer of both edges.
 
     Within surfaces of short edges vertices are as near, and edges that are deeper than they are long are not those that
@@ -149,7 +150,9 @@ def gaps_of_lines(first: tuple[Array, Array], second: tuple[Array, Array], n: Ar
     return np.asarray(np.einsum("md,md->m", first[0] - second[0], _unit(normal)))
 
 
-def _near_each_other(one: Placed, other: Placed, within: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _near_each_other(
+    one: PlacedEdges, other: PlacedEdges, within: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Places of all pairs that may be nearer than `within` and than the longer edge.
 
     There are few: edges are convex, so that surfaces with many are near each other in small parts.

@@ -13,7 +13,7 @@ from solvers.api import Array
 from solvers.mesh.periods import gap_of_boxes, no_periods, way_of, ways_to, without_longer
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.coulomb import Touch
-from solvers.rigid.edges import BEHIND, Crossings, Edges, Placed, crossings, gaps_of_lines
+from solvers.rigid.edges import FAR_BEHIND, Crossings, Edges, PlacedEdges, crossings, gaps_of_lines
 from solvers.rigid.gaps import Gaps, RigidWall, gaps, unit_normals
 from solvers.rigid.motion import RigidInstant
 from solvers.rigid.surface import positions
@@ -114,9 +114,9 @@ class _Side:
             np.add.at(found, corner, normals)
         return found
 
-    def edges_near(self, other: _Side, margin: float) -> Placed:
+    def edges_near(self, other: _Side, margin: float) -> PlacedEdges:
         """Sharp edges near the box of another surface."""
-        return Placed.within(self.of.edges, self.x, self.facets, other.box, margin)
+        return PlacedEdges.within(self.of.edges, self.x, self.facets, other.box, margin)
 
     def before(self, x: Array, facets: NDArray[np.int64], moment: Moment) -> Array:
         """Positions [m] at the start of the step of what is at the points x of facets now, shape (n, 3)."""
@@ -324,8 +324,8 @@ def _edges_near(start: int, points: _Side, surface: _Side, friction: float, mome
     size = min(points.extent, surface.extent)
     margin = NEAR_BOXES * size
     found = crossings(points.edges_near(surface, margin), surface.edges_near(points, margin), margin, NEAR_BODY * size)
-    if (found.gap < -BEHIND * size).any():
-        found = found[_apart_before(found, points, surface, moment) > -BEHIND * size]
+    if (found.gap < -FAR_BEHIND * size).any():
+        found = found[_apart_before(found, points, surface, moment) > -FAR_BEHIND * size]
     edge = found.one.number * len(surface.of.edges.ends) + found.other.number
     at = Gaps(found.gap, found.normal, surface.of.edges.facets[found.other.number, 0])
     vertex = start + points.of.edges.ends[found.one.number, 0]
