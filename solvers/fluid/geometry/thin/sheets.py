@@ -24,8 +24,8 @@ from solvers.fluid.geometry.bodies import closed_surfaces
 from solvers.fluid.geometry.pieces import off_boundary, without_slivers
 from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
 from solvers.fluid.geometry.thin.fluid_parts import FluidParts, grown, parts_of_fluid, ragged
-from solvers.fluid.geometry.thin.numbering import Connections, Numbering, numbered
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, same_nodes
+from solvers.fluid.geometry.thin.sheet_numbers import Connections, SheetNumbers, numbered
 from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
 from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin, solid_of
 from solvers.fluid.geometry.tied_slits import slivers_of, without_slits
@@ -77,7 +77,7 @@ class Sheets:
     """
 
     grid: Grid
-    numbering: Numbering
+    numbering: SheetNumbers
     fluid: Array  #: share of fluid in each cell of the mesh
     bounds: Indices  #: (cell of the mesh, facet that bounds its fluid), shape (n, 2)
     touching: Indices  #: cells of the box with fluid in which bodies touch, sorted
@@ -345,7 +345,7 @@ def find_sheets(
     )
 
 
-def _fluid(grid: Grid, solid: Array, parts: FluidParts, numbering: Numbering) -> Array:
+def _fluid(grid: Grid, solid: Array, parts: FluidParts, numbering: SheetNumbers) -> Array:
     """Share of fluid in each cell of the mesh; solid: share of solid in each cell of the box."""
     found = np.concatenate([np.clip(1.0 - solid, 0.0, 1.0), np.zeros(len(numbering.cells))])
     found[parts.touching] = found[parts.cell[numbering.sharing]] = 0.0

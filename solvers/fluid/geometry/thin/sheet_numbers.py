@@ -33,7 +33,7 @@ class Connections:
 
 
 @dataclass(frozen=True)
-class Numbering:
+class SheetNumbers:
     """Cells that follow those of the box; see `Sheets`."""
 
     of: Connections
@@ -47,14 +47,14 @@ class Numbering:
     around: Mask
     links: Indices
 
-    def equal(self, other: Numbering) -> bool:
+    def equal(self, other: SheetNumbers) -> bool:
         """The mesh and what is linked in it are the same."""
         tables = ("left", "parted", "cells", "copies", "around", "links")
         same = (np.array_equal(getattr(self, name), getattr(other, name)) for name in tables)
         return self is other or (self.pairs == other.pairs and all(same))
 
 
-def numbered(grid: Grid, of: Connections) -> Numbering:
+def numbered(grid: Grid, of: Connections) -> SheetNumbers:
     """The numbers of these parts."""
     cells, links, special, size = of.cell, of.links, of.special, grid.size
     copies = node_copies(grid, cells, links, of.same, special)
@@ -73,7 +73,7 @@ def numbered(grid: Grid, of: Connections) -> Numbering:
     passing = cells[ends[~changed]] @ [size, 1]
     at_faces = ends[changed & special[cells[ends]].any(axis=1)]
     members = np.concatenate([new, at_faces.ravel()])
-    return Numbering(
+    return SheetNumbers(
         of,
         cell_of_part,
         np.flatnonzero(shared[cells]),
