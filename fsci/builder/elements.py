@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 #: Poisson's ratio from which on the error of first-order displacement elements in bending is over twice that at 0.3.
 LOCKING = 0.45
 
+#: Relative rounding error of a Poisson's ratio by way of other constants; without it the unit of E decides at 0.45.
+ROUNDING_OF_RATIO = 1e-12
 
 #: Error in bending from which on the cells of a body deserve a warning.
 TOO_STIFF = 0.05
@@ -74,7 +76,7 @@ def nearly_incompressible(case: Case, name: str, mesh: Mesh) -> float | None:
     if mesh.points.shape[1] == 2 and case.structure.plane == "stress":
         return None
     nu = float(np.max(poisson(*lame_at_cells(case, name, mesh))))
-    return nu if nu >= LOCKING else None
+    return nu if nu >= LOCKING * (1.0 - ROUNDING_OF_RATIO) else None
 
 
 def lame_at_cells(case: Case, name: str, mesh: Mesh) -> tuple[Array, Array]:

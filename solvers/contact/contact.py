@@ -465,7 +465,7 @@ class Contact:
             "mean_gap": self._mean_gap.copy(),
             "status": self.active_set.status.copy(),
             "present": self.present.copy(),
-            "straight": self._integration.rims.straight.copy(),
+            "failures": self._integration.rims.failures.copy(),
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
             "obstacle_work": self._of_obstacles.save(),
@@ -481,7 +481,7 @@ class Contact:
         self.active_set.status = state["status"].copy()
         self.present = state["present"].copy()
         if not self._begun:  # what made a step fail counts when it is taken again
-            self._integration.rims.straight = state["straight"].copy()
+            self._integration.rims.failures = state["failures"].copy()
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
         self._of_obstacles.restore(state["obstacle_work"])

@@ -12,9 +12,9 @@ once the active set stays, since earlier iterates may pass far through the maste
 sharp edges among them. Cuts by planes of symmetry are none: there the surface goes on.
 
 A stiff rim that is dragged over the facets of something soft meets their slopes one by one: the force along the way
-rises and falls, and an equilibrium may end between two facets. Where a step failed because its active set cycled, its
-surface keeps its own normals until it has left contact: directions for single steps would be jumps, which no shorter
-step makes smaller.
+rises and falls, and an equilibrium may end between two facets. A step that failed because its active set cycled is
+taken again with the surface's own normals. If that happens twice, the surface has them until it has left contact: to
+and fro they would be jumps, which no shorter step makes smaller.
 """
 
 from __future__ import annotations
@@ -42,6 +42,10 @@ from solvers.mesh.cell_types import CELL_TYPES
 #: with 1, and 0.002 % with 2 as with any more.
 FACETS_FROM_RIM = 2
 
+#: Steps with these directions that cycle before a surface keeps its own. The first may be that of a first touch, whose
+#: iterates pass far through the master.
+ENOUGH_FAILURES = 2
+
 #: Integral of the functions of a facet's nodes over its area, by the number of corners between which a node is.
 SHARES = {
     "line": {1: 1 / 2},
@@ -67,7 +71,8 @@ class Rims:
         self._rims = add_up(parts, (C, C))  # mean over the nodes of rims near each multiplier
         self._near = np.diff(self._rims.indptr) > 0
         self._patches = tuple(patches)
-        self.straight = np.zeros(C, dtype=bool)  #: mask of those that keep their normals
+        self.failures = np.zeros(C, dtype=np.int64)  #: steps of this contact that cycled with these directions
+        self._turns = np.ones(C, dtype=bool)  # those that may have such a direction in this step
         self._pressed = np.zeros(C, dtype=bool)  # near a rim, and in contact with a set that has settled
 
     def begin_step(self, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
@@ -75,14 +80,17 @@ class Rims:
 
         active: of the multipliers in contact; cycled: of those by which the step failed that is taken again.
         """
+        self._turns = np.ones_like(active)
         for patch in self._patches:
-            mine = patch.multipliers
-            self.straight[mine] = (self.straight[mine] & active[mine].any()) | cycled[mine].any()
-        self._pressed = self._near & active & ~self.straight
+            mine, again = patch.multipliers, bool(cycled[patch.multipliers].any())
+            failures = int(self.failures[mine].max(initial=0)) if active[mine].any() else 0
+            self.failures[mine] = failures + (again and bool(self._pressed[mine].any()))
+            self._turns[mine] = not again and failures < ENOUGH_FAILURES
+        self._pressed = self._near & active & self._turns
 
     def press(self, active: NDArray[np.bool_]) -> bool:
         """Add multipliers that have come into contact in this step; returns whether there are any."""
-        new = self._near & active & ~self._pressed & ~self.straight
+        new = self._near & active & ~self._pressed & self._turns
         self._pressed = self._pressed | new
         return bool(new.any())
 

@@ -37,6 +37,12 @@ def chosen(folder, *changes):
     return found.element, "".join(notes), "".join(found.warnings)
 
 
+def test_the_unit_of_stress_does_not_choose(tmp_path):
+    stiffnesses = [5910.0 * 10.0**k for k in range(-6, 7)]
+    found = {chosen(tmp_path, f"material={{law: neo_hooke, E: {E!r}, nu: 0.45}}")[0] for E in stiffnesses}
+    assert found == {"mixed"}
+
+
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [

@@ -192,29 +192,36 @@ def block_above_base():
     return contact, (contact.multipliers.areas > 0.0).astype(np.int8)
 
 
-def test_a_surface_whose_set_cycled_keeps_its_normals_until_it_parts():
+def test_a_surface_whose_set_cycled_twice_keeps_its_normals_until_it_parts():
     """In the step that is taken again, in later ones and in resumed runs."""
     contact, pressed = block_above_base()
 
-    def straight(contact, status):
+    def failures(contact, status):
         contact.active_set.status[:] = status
         contact.begin_step()
-        return contact.save()["straight"]
+        return contact.save()["failures"]
 
-    before = contact.save()
-    contact.begin_step()
-    for status in (pressed, 0 * pressed, pressed):
-        contact.active_set.choose(status)
-    contact.restore(before)
-    np.testing.assert_array_equal(straight(contact, pressed), pressed)
+    def fail():
+        state = contact.save()
+        for status in (pressed, 0 * pressed, pressed):
+            contact.active_set.choose(status)
+        contact.restore(state)
+        return failures(contact, pressed)
+
+    assert not failures(contact, pressed).any()
+    np.testing.assert_array_equal(fail(), pressed)
+    np.testing.assert_array_equal(fail(), pressed)  # it had its own normals
+    contact.end_step(1.0)
+    failures(contact, pressed)
+    np.testing.assert_array_equal(fail(), 2 * pressed)
     contact.end_step(1.0)
     state = contact.save()
     other, _ = block_above_base()
     other.restore(state)
     for resumed in (contact, other):
-        np.testing.assert_array_equal(straight(resumed, pressed), pressed)
-        assert not straight(resumed, 0 * pressed).any()
-        assert not straight(resumed, pressed).any()
+        np.testing.assert_array_equal(failures(resumed, pressed), 2 * pressed)
+        assert not failures(resumed, 0 * pressed).any()
+        assert not failures(resumed, pressed).any()
 
 
 @pytest.mark.slow(seconds=60)
