@@ -25,9 +25,19 @@ GAP = 0.016
 FORCE = 7390.2
 
 
-def plug(element: str, grid: Grid, *, parts: int = 1, scale: float = 1.0, shut: bool = True, comm=MPI.COMM_SELF):
+def plug(
+    element: str,
+    grid: Grid,
+    *,
+    parts: int = 1,
+    scale: float = 1.0,
+    shut: bool = True,
+    gap: float = GAP,
+    inertia=False,
+    comm=MPI.COMM_SELF,
+):
     """A rectangle that moves into the end of a channel; each of its sides has some facets."""
-    corner = np.array([[0.737, GAP], [1.237, GAP], [1.237, 1.0 - GAP], [0.737, 1.0 - GAP]]) * scale
+    corner = np.array([[0.737, gap], [1.237, gap], [1.237, 1.0 - gap], [0.737, 1.0 - gap]]) * scale
     t = np.arange(parts)[:, None] / parts
     points = np.concatenate([a + t * (b - a) for a, b in zip(corner, np.roll(corner, -1, axis=0), strict=True)])
     count = np.arange(len(points))
@@ -40,7 +50,7 @@ def plug(element: str, grid: Grid, *, parts: int = 1, scale: float = 1.0, shut: 
         Patch("open", tuple({"x-", "x+"} - set(walls)), "traction", field(0, 0)),
         Patch("walls", walls, "no_slip"),
     ]
-    fluid = make_fluid(grid, patches, [body], element=element, scheme="steady", convection=False, comm=comm)
+    fluid = make_fluid(grid, patches, [body], element=element, scheme="steady", convection=inertia, comm=comm)
     solve_steady(fluid)
     return fluid
 
@@ -85,6 +95,13 @@ def test_a_plug_warns_of_what_its_gaps_leak(element, grid, off, parts):
     fluid = plug(element, grid, parts=parts)
     assert error_of(fluid) == pytest.approx(off, abs=0.1)
     assert [one.warns for one in said(fluid)] == [abs(off) > 5.0] * 2
+
+
+def test_velocities_continued_into_walls_are_no_flow():
+    """With inertia, in gaps of 0.01 cells: those of their nodes are 1e4 times as fast as the fluid."""
+    fluid = plug("q2q1", box((20, 10)), gap=0.001, inertia=True)
+    assert [one.share for one in said(fluid)] == pytest.approx([1.0, 1.0], abs=0.01)
+    assert all(one.warns for one in said(fluid))
 
 
 @pytest.mark.parametrize("level", [1.0, 1e6])

@@ -342,6 +342,16 @@ def test_the_table_is_that_of_the_benchmark():
         assert row["error [%]"] == pytest.approx(kept["error [%]"], rel=1e-2)
 
 
+def test_layers_have_more_cells_on_finer_grids():
+    """In each scene of bodies in a channel: velocities that parabolas continue into bodies are none of the flow."""
+    for kind, element in (("smooth", "q1q1"), ("smooth", "q2q1"), ("sharp", "q1q1"), ("sharp", "q2q1")):
+        for by_layer, by_across in zip(
+            *(tables.table(by)[kind, element] for by in ("cells", "across")),  # type: ignore[arg-type]
+            strict=True,
+        ):
+            assert [error for _, error in by_layer] == [error for _, error in by_across]
+
+
 @pytest.mark.parametrize(("element", "gap", "warns"), [("q2q1", 1.0, False), ("q1q1", 1.0, True), ("q1q1", 0.5, True)])
 def test_films_between_parallel_plates(element, gap, warns):
     """Driven by a force: with q2q1 the flow is exact at any height (`test_fluid_gap.py`), with q1q1 far too small."""

@@ -21,6 +21,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fluid.cut.extension import FREE_SHARE
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.resolution.cells import BodyCells
 from solvers.fluid.flow.resolution.shape import (
@@ -111,8 +112,20 @@ def _speed(fluid: Fluid, body: int) -> float:
     motion, nodes = fluid.moving.motions[body], fluid.unknowns.velocity
     low, high = (end + _home(fluid, motion.x) for end in (motion.x.min(axis=0), motion.x.max(axis=0)))
     margin = 0.5 * (high - low).max()
-    x = nodes.points[: nodes.owned, : fluid.dim]
+    x = nodes.points[:, : fluid.dim]
     near = ((x > low - margin) & (x < high + margin)).all(axis=1)
-    active = fluid.system.active_dofs[nodes.dofs[: nodes.owned]].all(axis=1)
-    velocity = fluid.flow[nodes.dofs[: nodes.owned]][near & active] - motion.v.mean(axis=0)
+    active = fluid.system.active_dofs[nodes.dofs].all(axis=1)
+    velocity = fluid.flow[nodes.dofs[near & active & _well_cut(fluid)]] - motion.v.mean(axis=0)
     return float(fluid.comm.allreduce(np.linalg.norm(velocity, axis=1).max(initial=0.0), op=MPI.MAX))
+
+
+def _well_cut(fluid: Fluid) -> NDArray[np.bool_]:
+    """Mask of the nodes of the velocity of which a cell has so much fluid that they are free.
+
+    Others may have the velocity of a film, which a parabola continues into its walls (h / g)^2 times as large.
+    """
+    unknowns, cells = fluid.unknowns, np.flatnonzero(fluid.cut.fraction >= FREE_SHARE[fluid.dim])
+    found = np.zeros(unknowns.local, dtype=bool)
+    found[unknowns.cell_velocity[cells]] = True
+    mask: NDArray[np.bool_] = found[unknowns.velocity.dofs[:, 0]]
+    return mask
