@@ -16,6 +16,9 @@ from solvers.mesh.wall_thickness import wall_thickness
 #: 4 (L/t)^2 times as far as the same force along it, there a hundred times.
 SLENDER = 5.0
 
+#: Share by which the lengths of a body may be off by the rounding of its place: that of 1e7 of its thicknesses.
+PLACE_ROUNDING = 1e-9
+
 #: Facets whose walls are measured.
 WALLS_MEASURED = 64
 
@@ -74,7 +77,8 @@ def _walls(mesh: Mesh) -> _Walls:
     sample = np.arange(0, len(rows), max(1, len(rows) // WALLS_MEASURED))
     walls = wall_thickness(corners.mean(axis=1), vectors / areas[:, None], sample)
     x = mesh.points - mesh.points.mean(axis=0)
-    some = walls <= np.ptp(x @ np.linalg.eigh(x.T @ x)[1], axis=0).max() / SLENDER
+    length = np.ptp(x @ np.linalg.eigh(x.T @ x)[1], axis=0).max()
+    some = SLENDER * walls <= (1.0 + PLACE_ROUNDING) * length
     chosen, walls = sample[some], walls[some]
     behind = 0.5 * float(walls @ areas[chosen]) * areas.sum() / areas[sample].sum()
     slender = bool(behind >= 0.5 * volumes.sum())

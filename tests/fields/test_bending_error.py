@@ -89,6 +89,9 @@ def test_a_beam_by_default(tmp_path):
     [
         ("{shape: rectangle, size: [1, 0.19], cells: [10, 2]}", 2),
         ("{shape: rectangle, size: [1, 0.21], cells: [10, 2]}", 1),
+        ("{shape: rectangle, size: [0.1, 0.5], cells: [2, 10]}", 2),  # five times as long as thick, wherever it is
+        ("{shape: rectangle, size: [0.1, 0.5], cells: [2, 10], origin: [1.53, 0]}", 2),
+        ("{shape: rectangle, size: [1e-4, 5e-4], cells: [2, 10], rotate: {angle: 33}, origin: [-17.3, 91]}", 2),
         ("{shape: rectangle, size: [1e-3, 1e-4], cells: [10, 1], rotate: {angle: 33}, translate: [1e3, 0]}", 2),
         ("{shape: rectangle, size: [0.1, 1], cells: [1, 10], cell: tri}", 2),
         ("{shape: disc, radius: 1, cells: [32, 4]}", 1),
@@ -150,15 +153,15 @@ def test_an_order_that_is_given_is_a_note(tmp_path):
 
 
 def test_order_in_contact(tmp_path):
-    """Slender bodies that slide keep first order, with a warning; ties do not matter."""
+    """Slender bodies have second order where they slide or are tied, too."""
     words = ("contact={obstacles: {wall: {mesh: {shape: disc, radius: 0.1, cells: [8, 2], translate: [0.5, -0.2]}}}}",)
     pair = "{slave: {body: beam, on: bottom}, master: {obstacle: wall}}"
     case = load(tmp_path, *words, f"contact.pairs.touch={pair}")
     body = read_body(case, "beam")
     found = choose_element(case, "beam", body)
-    assert (body.cell_type, found.notes) == ("quad", ())
-    assert found.warnings == ("first-order cells make it about 15 % too stiff in bending; take 'order: 2'",)
-    assert read_body(load(tmp_path, "contact={bodies: all}"), "beam").cell_type == "quad"
+    assert (body.cell_type, found.warnings) == ("quad9", ())
+    assert found.notes == ("cells of second order, since it is slender",)
+    assert read_body(load(tmp_path, "contact={bodies: all}"), "beam").cell_type == "quad9"
     other = "{mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], origin: [0, -1]}"
     other += ", material: {law: neo_hooke, E: 1, nu: 0.3}}"
     tie = "{slave: {body: beam, on: bottom}, master: {body: block, on: top}, tied: true}"
