@@ -98,7 +98,7 @@ def _surface(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
 
 def _free(bodies: RigidBodies) -> Iterator[MovingBody]:
     for index, body in enumerate(bodies.bodies):
-        yield MovingBody(body.name, body.facets, partial(_position, bodies, index), free=True)
+        yield MovingBody(body.name, body.facets, partial(_position, bodies, index), free=True, rigid=True)
 
 
 def _position(bodies: RigidBodies, index: int, t: float) -> Array:
@@ -110,7 +110,7 @@ def _position(bodies: RigidBodies, index: int, t: float) -> Array:
 def _given(bodies: list[ImmersedBody]) -> Iterator[MovingBody]:
     for body in bodies:
         if (motion := body.motion) is not None:
-            yield MovingBody(body.surface.name, body.surface.facets, _positions_of(motion), free=False)
+            yield MovingBody(body.surface.name, body.surface.facets, _positions_of(motion), free=False, rigid=True)
 
 
 def _positions_of(motion: Callable[[float], Any]) -> Callable[[float], Array]:
@@ -125,7 +125,7 @@ def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[MovingBody]:
     for name in (name for name, settings in case.contact.obstacles.items() if settings.free is None):
         facets, _, points = shared(comm, partial(_obstacle, case, name))
         motion = motion_of_obstacle(case, name, points) or partial(_at_rest, points)
-        yield MovingBody(name, facets, motion, free=False)
+        yield MovingBody(name, facets, motion, free=False, rigid=True)
 
 
 def _obstacle(case: Case, name: str) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:

@@ -29,6 +29,7 @@ class MovingBody:
     positions: Callable[[float], Array]  #: time [s] -> positions of the vertices [m], (n, dim), on all processes
     free: bool  #: elastic, or a rigid body that the flow moves; else rigid and at rest or driven
     pieces: int = 1  #: edges of facets here in one edge of a facet of its mesh: 2 with middle nodes
+    rigid: bool = False
     dry: NDArray[np.bool_] | None = None  #: vertices without fluid, (n,), which walls of the fluid's box do not hold
 
 

@@ -152,7 +152,9 @@ class Overlaps:
         worthless = depth > limit and (meeting is not None or not self._at_start(i, j))
         names, place = self._names(i, j), place_of(where)
         message = f"{names} overlap by {depth:.3g} {place}: "
-        if meeting is None:
+        if meeting is None and self._bodies[i].rigid and self._bodies[j].rigid:
+            message += "rigid bodies that overlap have no contact; move one of them, or take a smaller 'step'"
+        elif meeting is None:
             message += "no pair of contact names them, so nothing holds them apart; give them a pair"
         else:
             message += f"contact ({', '.join(meeting.pairs)}) does not hold them apart; take a smaller 'step' or a "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,16 @@ def test_overlap_is_named_with_its_depth(dim, scale, origin, order):
             assert f"{found[0].value:.3g}" in found[0].message
             assert "no pair of contact" in found[0].message
             assert found[0].worthless is (FailureKind.NOT_HELD if depth == 0.3 else None)
+
+
+def test_rigid_bodies_are_told_another_remedy():
+    """They have no pairs."""
+    points, facets = block(2)
+    still = replace(moving("still", points, facets, [(0.0, 0.0)] * 2, free=False), rigid=True)
+    other = moving("other", points, facets, [(0.0, 1.2), (0.0, 0.7)])
+    for rigid, words in ((True, "move one of them, or take a smaller 'step'"), (False, "give them a pair")):
+        (found,) = watch([still, replace(other, rigid=rigid)]).look(1.0, 1.0)
+        assert found.message.endswith(words)
 
 
 @pytest.mark.parametrize("count", [3, 7])
