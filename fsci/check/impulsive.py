@@ -12,14 +12,14 @@ from fsci.case import Case
 Array = NDArray[np.float64]
 
 #: probes of a body in the flow that the impulse is in
-OF_FORCE = ("force", "moment", "power", "drag_coefficient", "lift_coefficient")
+MEASURED_FORCES = ("force", "moment", "power", "drag_coefficient", "lift_coefficient")
 SAMPLES = 9  #: along each side of a face
 
 
 def impulsive(case: Case) -> Iterator[str]:
     """Notes on patches with a velocity at the start of a flow at rest, where forces on bodies are measured."""
     fluid = case.fluid
-    measured = any(probe.quantity in OF_FORCE for probe in case.probes.values())
+    measured = any(probe.quantity in MEASURED_FORCES for probe in case.probes.values())
     if fluid is None or fluid.scheme == "steady" or fluid.initial_velocity is not None or not measured:
         return
     unit = f"{case.units.length}/{case.units.time}"

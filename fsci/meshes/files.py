@@ -25,7 +25,7 @@ from solvers.mesh.topology import boundary_facets, find_facets, signed_volumes
 Indices = NDArray[np.int64]
 
 #: Types of cells that a mesh may have.
-GEOMETRY = (".step", ".stp", ".iges", ".igs", ".brep")  #: endings of files of CAD without cells
+CAD_ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")  #: endings of files of CAD without cells
 MESHED = tuple(name for name, cell_type in CELL_TYPES.items() if cell_type.facet)
 
 
@@ -438,7 +438,7 @@ def _gmsh_type(kind: int) -> tuple[str, Indices]:
 def _read_meshio(path: Path) -> Content:
     import meshio
 
-    if path.suffix.lower() in GEOMETRY:
+    if path.suffix.lower() in CAD_ENDINGS:
         script = f'SetFactory("OpenCASCADE"); Merge "{path.name}"; MeshSize {{:}} = 0.1;'
         raise MeshError(f"{path.name}: this is a geometry without a mesh; name a file .geo with the lines {script}")
     printed = StringIO()

@@ -18,7 +18,7 @@ from solvers.mesh.distance import nearest_points
 from solvers.mesh.mesh import Mesh
 from solvers.mesh.tessellation import area_vectors, tessellate
 
-ROUNDING = 1e-13  #: of coordinates, relative to the largest of them
+SAME_PLACE = 1e-13  #: of coordinates, relative to the largest of them
 FACETS_TRIED = 8  #: by their middles, to which the distance of a corner is computed
 
 
@@ -59,7 +59,7 @@ class DistantPair:
     def distance(self) -> float:
         """[m]; zero where it is the rounding of coordinates."""
         found = float(np.linalg.norm(self.ends[1] - self.ends[0]))
-        return found if found > ROUNDING * np.abs(self.ends).max() else 0.0
+        return found if found > SAME_PLACE * np.abs(self.ends).max() else 0.0
 
 
 @dataclass(frozen=True)
