@@ -29,7 +29,7 @@ def draw(path: Path, found: Mapping[str, BandedValue], runs: Sequence[Done]) -> 
     points = {
         role: [
             (one.seconds, 100.0 * error, one.run.name)
-            for one in sorted(runs, key=lambda one: one.seconds)
+            for one in sorted(runs, key=lambda one: one.run.size)
             if one.run.role == role and one.seconds and (error := error_of(one, found)) is not None
         ]
         for role in MARKERS

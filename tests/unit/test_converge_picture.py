@@ -9,10 +9,13 @@ from fsci.converge import picture
 def test_one_error(tmp_path, monkeypatch):
     monkeypatch.setattr(picture, "error_of", lambda one, found: 1e-6)
     runs = [
-        SimpleNamespace(run=SimpleNamespace(role="level", name=name), seconds=seconds)
-        for name, seconds in (("case", 3.1), ("coarser_1.41", 3.0), ("coarser_2", 5.1))
+        SimpleNamespace(run=SimpleNamespace(role="level", name=name, size=size), seconds=seconds)
+        for name, size, seconds in (("case", 1.0, 3.1), ("coarser_2", 2.0, 5.1), ("coarser_1.41", 1.41, 3.0))
     ]
+    joined = []
+    monkeypatch.setattr("matplotlib.axes.Axes.loglog", lambda self, x, *rest, **more: joined.append(x))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert picture.draw(tmp_path / "picture.png", {}, runs)
+    assert joined == [[3.1, 3.0, 5.1]], "from level to level, whatever time they took"
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
