@@ -34,14 +34,34 @@ if TYPE_CHECKING:
 def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodies | None = None) -> Contact:
     """All pairs of a case; rigid: free bodies. Raises CaseError (collective)."""
     assert case.contact is not None
-    return contact_of(case, comm, list(case.contact.pairs), _pairs(case, comm, bodies, rigid))
+    pairs = _pairs(case, comm, bodies, rigid)
+    return contact_of(case, comm, list(case.contact.pairs), pairs, comm.bcast(_unheld(case, bodies), root=0))
 
 
-def contact_of(case: Case, comm: MPI.Comm, names: Sequence[str], pairs: Sequence[Pair]) -> Contact:
+def _unheld(case: Case, bodies: Sequence[Body]) -> list[list[int]]:
+    """Numbers of the pairs of each static body that only contact holds, on the first process."""
+    from fsci.check.held import is_held
+
+    assert case.contact is not None
+    assert case.structure is not None
+    if case.structure.dynamics is not None:
+        return []
+    loose = list(case.rigid or ())
+    for body in bodies:
+        if body.domain.source is not None and not is_held(case, body.name, body.domain.source):
+            loose.append(body.name)
+    sides = [{side.body or side.obstacle for _, side in pair.sides} for pair in case.contact.pairs.values()]
+    pairs = [[number for number, names in enumerate(sides) if name in names] for name in loose]
+    return [found for found in pairs if found]
+
+
+def contact_of(
+    case: Case, comm: MPI.Comm, names: Sequence[str], pairs: Sequence[Pair], unheld: Sequence[Sequence[int]] = ()
+) -> Contact:
     """Contact of pairs with the settings of a case."""
     assert case.structure is not None
     moves, c_n = case.structure.dynamics is not None, 1.0 if case.contact is None else case.contact.c_n
-    return Contact(pairs, names=names, c_n=c_n, keep_overlap=moves, periods=periods(case), comm=comm)
+    return Contact(pairs, names=names, c_n=c_n, keep_overlap=moves, periods=periods(case), unheld=unheld, comm=comm)
 
 
 def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodies | None) -> list[Pair]:

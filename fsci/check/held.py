@@ -32,19 +32,29 @@ def free_motions(case: Case, name: str, mesh: Mesh) -> str | None:
     if any(name == side.body for pair in pairs.values() for _, side in pair.sides) or _sprung(case, name):
         return None
     dim = mesh.points.shape[1]
-    centre = mesh.points.mean(axis=0)
-    extent = float(np.ptp(mesh.points, axis=0).max())
-    conditions = [row for rows in _conditions(case, name, mesh, centre, extent) for row in rows]
-    modes = dim + (1 if dim == 2 else 3)
-    matrix = np.array(conditions).reshape(-1, modes)
+    matrix, free = _held(case, name, mesh)
     names = [*(f"translation along {axis}" for axis in "xyz"[:dim]), *_rotations(dim)]
-    free = modes - int(np.linalg.matrix_rank(matrix, tol=UNHELD * max(len(matrix), 1) ** 0.5)) if len(matrix) else modes
     if not free:
         return None
     alone = [word for word, column in zip(names, matrix.T, strict=True) if np.abs(column).max(initial=0.0) < UNHELD]
     # a rotation about another point than the centre, or a translation along no axis
     words = [*alone, *(["a combination of translation and rotation"] if free > len(alone) else [])]
     return f"no support, spring or pair holds {_listed(words)} of the body, which static equilibrium does not determine"
+
+
+def is_held(case: Case, name: str, mesh: Mesh) -> bool:
+    """Whether supports and springs leave a static body no rigid motion."""
+    return _sprung(case, name) or not _held(case, name, mesh)[1]
+
+
+def _held(case: Case, name: str, mesh: Mesh) -> tuple[Array, int]:
+    """(conditions of supports and springs on rigid motions, as in `_conditions`; count of motions that are free)."""
+    dim, extent = mesh.points.shape[1], float(np.ptp(mesh.points, axis=0).max())
+    conditions = [row for rows in _conditions(case, name, mesh, mesh.points.mean(axis=0), extent) for row in rows]
+    modes = dim + (1 if dim == 2 else 3)
+    matrix = np.array(conditions).reshape(-1, modes)
+    tolerance = UNHELD * max(len(matrix), 1) ** 0.5
+    return matrix, modes - (int(np.linalg.matrix_rank(matrix, tol=tolerance)) if len(matrix) else 0)
 
 
 def _sprung(case: Case, name: str) -> bool:

@@ -29,6 +29,7 @@ from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
+from solvers.contact.unheld import nearest_gaps
 from solvers.contact.violation import rounding, violation
 from solvers.contact.work import FrictionWork, GivenWork
 
@@ -49,6 +50,7 @@ class Contact:
     where a slave slides onto a master: a node enters the master before its area is covered. If one step closed this
     overlap, it would accelerate the node. If it stays, contact does no work. The first step closes all overlaps.
     periods: lengths [m] after which space repeats, infinite where it does not, shape (dim,); None: nowhere.
+    unheld: numbers of the pairs of each static body that only contact holds; see `unheld`.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class Contact:
         c_n: float = 1.0,
         keep_overlap: bool = False,
         periods: Array | None = None,
+        unheld: Sequence[Sequence[int]] = (),
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.c_n = c_n
@@ -87,6 +90,8 @@ class Contact:
         extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
         self._touching = max(GAP_OF_EXTENT * extent, GAP_OF_DISTANCE * far)  # gaps [m]
         self._nearly = GAP_OF_TRIED * max(extent, far)
+        self._tolerance = np.full(count, self._nearly)  # gap that counts as closed, at the latest evaluation [m]
+        self._unheld, self._first = tuple(unheld), True  # first choice in a solve
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
         self._integration = Integration(self.interface, comm)
@@ -134,6 +139,7 @@ class Contact:
         self._stiffnesses.begin_step()
         cycled, self._begun = self.active_set.returned & self._begun, True
         self.active_set.begin_step()
+        self._first = True
         self._integration.begin_step(self.x, self.active_set.active, cycled)
         self._condensation = None
         self.slip = None
@@ -142,6 +148,7 @@ class Contact:
     def begin_solve(self) -> None:
         """New loads: sets that the old ones chose are no sign of a cycle."""
         self.active_set.begin_solve()
+        self._first = True
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
@@ -201,10 +208,15 @@ class Contact:
         if self.terms is not None:
             self._D = self._redistributed(self.terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
+            self._tolerance = np.where(self.active_set.tried, self._touching, self._nearly)
+            if self._unheld and self._first:
+                areas = self.terms.D_of_pair * self._covers
+                self._tolerance += nearest_gaps(self._unheld, areas, self._mean_gap, self.active_set.active)
             for law, which in self.interface.laws:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
+        self._first = False
 
     @property
     def _constrained(self) -> NDArray[np.bool_]:
@@ -245,7 +257,7 @@ class Contact:
             stuck=self.active_set.stuck[which],
             c_n=self.c_n * stiffness,
             c_t=self.c_n * stiffness,
-            touching=np.where(self.active_set.tried[which], self._touching, self._nearly),
+            touching=self._tolerance[which],
         )
 
     def _drop_dependent(self, status: Statuses) -> None:

@@ -1,9 +1,11 @@
-"""Statics of a block that is pushed over a gap against a wall: words without a hold, its load with one."""
+"""Statics of a block that is pushed over a gap against a wall: its load, or words where it meets none."""
 
+import numpy as np
 import pytest
 from programs import fsci
 
 from fsci.running.history import read_history
+from solvers.contact.unheld import nearest_gaps
 
 CASE = """
 time: {step: 0.5, end: 1, retry: {halvings: 1}}
@@ -29,8 +31,42 @@ def run(folder, text):
     return fsci("run", path, "-o", folder / "out")
 
 
-def test_statics_has_no_place_for_it_and_says_what_helps(tmp_path):
-    done = run(tmp_path, CASE)
+@pytest.mark.parametrize(("old", "new"), [
+    ("time:", "time:"),
+    ("origin: [1.05, -1]", "origin: [1.1, -1]"),
+    ("cells: [2, 2]", "cells: [3, 3], order: 2"),
+    ("cells: [2, 2]", "cells: [4, 3], cell: tri"),
+    ("{slave: {body: block, on: right}, master: {obstacle: wall}}",
+     "{slave: {body: block, on: right}, master: {obstacle: wall}, friction: {coefficient: 0.3}}"),
+    ("step: 0.5", "step: 0.25"),
+])  # fmt: skip
+def test_it_reaches_the_wall_and_hands_its_load_over(tmp_path, old, new):
+    """The node that is nearest is tried: statics has an answer once it touches."""
+    assert old in CASE
+    done = run(tmp_path, CASE.replace(old, new))
+    assert done.returncode == 0, done.stderr
+    history = read_history(tmp_path / "out" / "history.csv")
+    assert history["contact.wall.x"] == pytest.approx(-100.0 * history["time"], rel=1e-9)
+
+
+def test_on_two_processes(tmp_path):
+    (tmp_path / "case.yaml").write_text(CASE)
+    assert fsci("run", tmp_path, "-o", tmp_path / "out", processes=2).returncode == 0
+    assert read_history(tmp_path / "out" / "history.csv")["contact.wall.x"] == pytest.approx([-50.0, -100.0], rel=1e-9)
+
+
+def test_the_nearest_node_of_each_body():
+    """Unless one is in contact; the pairs of a body count together."""
+    of_pair = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
+    gap, none = np.array([0.3, 0.2, 0.1, 0.5]), np.zeros(4, dtype=bool)
+    assert nearest_gaps([[0], [1]], of_pair, gap, none) == pytest.approx([0.2, 0.2, 0.1, 0.1])
+    assert nearest_gaps([[0, 1]], of_pair, gap, none) == pytest.approx([0.1] * 4)
+    assert nearest_gaps([[0, 1]], of_pair, gap, np.array([True, False, False, False])) == pytest.approx([0.0] * 4)
+
+
+@pytest.mark.parametrize(("old", "new"), [("100*t", "-100*t"), ("origin: [1.05, -1]", "origin: [9, -1]")])
+def test_what_goes_away_or_is_far_has_no_place_and_is_told_what_helps(tmp_path, old, new):
+    done = run(tmp_path, CASE.replace(old, new))
     assert done.returncode == 1
     words = done.stdout + done.stderr
     assert "is far larger than the body, 1: is a body not supported? One that is free until it touches needs" in words

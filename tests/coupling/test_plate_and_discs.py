@@ -42,10 +42,9 @@ def lowest(x):
     return float(np.interp(max(0.0, x - 2.0), 0.2 * np.sin(angles), 0.2 * np.cos(angles)))
 
 
-def settled(folder, x, order=(0, 1)):
+def settled(folder, x, order=(0, 1), above=0.0005):
     """Contact forces along y by pair at the end."""
-    # 0.003 within the plate: gaps of contact are means over facets, which a corner that just touches leaves open
-    heights = [0.297 + lowest(at) for at in x]
+    heights = [0.3 + above + lowest(at) for at in x]
     discs = [("one", x[0], heights[0], 100), ("two", x[1], heights[1], 160)]
     text = "".join(
         DISC.format(name=name, x=at, y=y, density=density) for name, at, y, density in (discs[k] for k in order)
@@ -69,3 +68,11 @@ def test_contact_carries_the_weights(tmp_path, x):
     assert known["contact.plate_bottom_floor.y"] == pytest.approx(sum(weights.values()) + 300.0, rel=1e-6)
     other = settled(tmp_path / "other", x, (1, 0))
     assert other == pytest.approx(known, abs=1e-9 * 623.0, rel=0.0)
+
+
+@pytest.mark.parametrize("above", [-0.002, 0.0, 0.02])
+def test_where_they_begin_does_not_matter(tmp_path, above):
+    """Bodies that nothing holds fall onto the plate, or are pushed out of it."""
+    assert settled(tmp_path / "other", (0.6, 1.4), above=above) == pytest.approx(
+        settled(tmp_path / "first", (0.6, 1.4)), abs=1e-9 * 623.0, rel=0.0
+    )

@@ -96,7 +96,7 @@ def test_block_that_was_nowhere_near_is_an_error():
     place(fluid, points, 0.0)
     for number in range(3):
         advance(fluid, points, number, 0.02 * (number + 1))
-    with pytest.raises(StepFailed, match="3.8 cells from where the step began"):
+    with pytest.raises(StepFailed, match=r"3\.8 cells from where the step began"):
         advance(fluid, points, 3, 0.25)
 
 
