@@ -11,7 +11,7 @@ The grid is cut at the first position of the bodies during the start, so that th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,6 @@ from coupling.coupled import Coupled
 from coupling.divided import lengths
 from coupling.ports import Start
 from solvers.api import Array, StepFailed
-from solvers.exchange import Motion
 
 #: Way in the first step, in cells, below which a body counts as at rest: its acceleration may be rounding.
 REST = 1e-6
@@ -121,9 +120,13 @@ def _share_acceleration(
     moved = start.solid.steps * dt**2 * start.solid.acceleration()
     if moved > start.flow.smallest_cell:
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
-    if start.solid.steps == 1:
-        dt = _resolving(coupled, start, t, dt, velocity, solve)
+    initial = coupled.save()
+    braked = _braked(coupled, start, t, dt, velocity, solve) if start.solid.steps == 1 else None
     acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
+    if braked is not None and (decay := _decay(coupled, start, acceleration, braked, dt)) > 1.0:
+        coupled.restore(initial)
+        dt = lengths(dt, dt / decay)[0]
+        acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
     force = coupled.force()
     start.solid.end()
     interface.end_start(dt, velocity, acceleration)
@@ -147,24 +150,28 @@ def _acceleration(
     return (interface.displacement() - before) / dt**2
 
 
-def _resolving(
+def _braked(
     coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, solve: Callable[[], object]
-) -> float:
-    """Length [s] of the first step, dt / 2^m, within which no body's acceleration decays much.
+) -> Array | None:
+    """The acceleration [m/s^2] of the vertices in a step dt of the flow, None without a solution; goes back."""
+    initial = coupled.save()
+    try:
+        return _acceleration(coupled, start, t, dt, dt, velocity, solve)
+    except StepFailed:
+        return None
+    finally:
+        coupled.restore(initial)
 
-    A body that the flow brakes by the rate L has the acceleration a / (1 + L k) in a step k of backward Euler. With
-    a step k = dt and one that is short, L dt follows; the first step is not longer than 1 / L.
+
+def _decay(coupled: Coupled, start: Start, acceleration: Array, braked: Array, dt: float) -> float:
+    """L dt of the body that the flow brakes most, by the rate L.
+
+    Its acceleration is a / (1 + L k) in a step k of backward Euler: `braked` in k = dt, and `acceleration` in one that
+    is short. A first step should not be longer than 1 / L.
     """
-    initial, found = coupled.save(), list[Mapping[str, Motion]]()
-    for short in (dt, start.flow.share * dt):
-        try:
-            a = _acceleration(coupled, start, t, dt, short, velocity, solve)
-        except StepFailed:
-            return dt
-        finally:
-            coupled.restore(initial)
-        found.append(coupled.interface.at_start(a))
-    late, soon = ([float(np.linalg.norm(motion.v, axis=1).max()) for motion in some.values()] for some in found)
+    soon, late = (
+        [float(np.linalg.norm(motion.v, axis=1).max()) for motion in coupled.interface.at_start(a).values()]
+        for a in (acceleration, braked)
+    )
     least = REST * start.flow.smallest_cell / dt**2
-    decay = max((a / b - 1.0 for a, b in zip(soon, late, strict=True) if min(a, b) > least), default=0.0)
-    return lengths(dt, dt / decay)[0] if decay > 1.0 else dt
+    return max((a / b - 1.0 for a, b in zip(soon, late, strict=True) if min(a, b) > least), default=0.0)
