@@ -22,6 +22,7 @@ class ActiveSet:
 
     def __init__(self, size: int):
         self.status: Statuses = np.full(size, OPEN, dtype=np.int8)
+        self.first = True  #: whether the next choice is the first one of a solve
         self.changed = False  #: whether the latest choice changed the set
         self.changes = 0  #: count of choices in this step that changed the set
         self.alternating = 0  #: nodes whose status changed when an earlier set came back in this step; 0: none did
@@ -45,6 +46,7 @@ class ActiveSet:
 
     def begin_solve(self) -> None:
         """Discard the earlier sets, which other loads may have chosen."""
+        self.first = True
         self.alternating, self.wedged, self._earlier = 0, False, {self.status.tobytes()}
         self.returned = np.zeros_like(self.returned)
         self._reversals, self._alternates = set(), False
@@ -62,6 +64,7 @@ class ActiveSet:
                 self.returned = self.returned | (status != self.status)
                 self.wedged |= bool((np.minimum(status, self.status)[status != self.status] == SLIP).any())
             self._earlier.add(chosen)
+        self.first = False
         self.status = status.copy()
         self.tried = self.tried | self.active
         self.stuck = self.stuck | (status == STICK) & (not self._alternates)

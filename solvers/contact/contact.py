@@ -91,7 +91,7 @@ class Contact:
         self._touching = max(GAP_OF_EXTENT * extent, GAP_OF_DISTANCE * far)  # gaps [m]
         self._nearly = GAP_OF_TRIED * max(extent, far)
         self._tolerance = np.full(count, self._nearly)  # gap that counts as closed, at the latest evaluation [m]
-        self._unheld, self._first = tuple(unheld), True  # first choice in a solve
+        self._unheld = tuple(unheld)
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
         self._integration = Integration(self.interface, comm)
@@ -139,7 +139,6 @@ class Contact:
         self._stiffnesses.begin_step()
         cycled, self._begun = self.active_set.returned & self._begun, True
         self.active_set.begin_step()
-        self._first = True
         self._integration.begin_step(self.x, self.active_set.active, cycled)
         self._condensation = None
         self.slip = None
@@ -148,7 +147,6 @@ class Contact:
     def begin_solve(self) -> None:
         """New loads: sets that the old ones chose are no sign of a cycle."""
         self.active_set.begin_solve()
-        self._first = True
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
@@ -209,14 +207,13 @@ class Contact:
             self._D = self._redistributed(self.terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             self._tolerance = np.where(self.active_set.tried, self._touching, self._nearly)
-            if self._unheld and self._first:
+            if self._unheld and self.active_set.first:
                 areas = self.terms.D_of_pair * self._covers
                 self._tolerance += nearest_gaps(self._unheld, areas, self._mean_gap, self.active_set.active)
             for law, which in self.interface.laws:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
-        self._first = False
 
     @property
     def _constrained(self) -> NDArray[np.bool_]:
