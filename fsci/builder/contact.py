@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
+from fsci.builder.held import is_held
 from fsci.builder.named import named
 from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.overlap import facets_in_each_other
@@ -40,8 +41,6 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: Rig
 
 def _unheld(case: Case, bodies: Sequence[Body]) -> list[list[int]]:
     """Numbers of the pairs of each static body that only contact holds, on the first process."""
-    from fsci.check.held import is_held
-
     assert case.contact is not None
     assert case.structure is not None
     if case.structure.dynamics is not None:

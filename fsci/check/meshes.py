@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.held import free_motions
 from fsci.builder.known_pairs import require_known_pairs
 from fsci.builder.skin import find_skin
 from fsci.case import Case, CaseError
@@ -22,7 +23,6 @@ from fsci.case.material import OwnLawSection
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
-from fsci.check.held import free_motions
 from fsci.check.scene import Placed, around_box, overlaps, pair_sizes
 from fsci.meshes.enclosed import require_outlet
 from fsci.meshes.nested import read_grid
