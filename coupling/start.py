@@ -120,10 +120,13 @@ def _share_acceleration(
     moved = start.solid.steps * dt**2 * start.solid.acceleration()
     if moved > start.flow.smallest_cell:
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
-    initial = coupled.save()
-    braked = _braked(coupled, start, t, dt, velocity, solve) if start.solid.steps == 1 else None
+    initial = coupled.save() if start.solid.steps == 1 else None  # free bodies, which the flow may brake
+    braked = None if initial is None else _braked(coupled, start, t, dt, velocity, solve)
+    if initial is not None:
+        coupled.restore(initial)
     acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
-    if braked is not None and (decay := _decay(coupled, start, acceleration, braked, dt)) > 1.0:
+    decay = 0.0 if braked is None else _decay(coupled, start, acceleration, braked, dt)
+    if initial is not None and decay > 1.0:
         coupled.restore(initial)
         dt = lengths(dt, dt / decay)[0]
         acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
@@ -153,14 +156,11 @@ def _acceleration(
 def _braked(
     coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, solve: Callable[[], object]
 ) -> Array | None:
-    """The acceleration [m/s^2] of the vertices in a step dt of the flow, None without a solution; goes back."""
-    initial = coupled.save()
+    """The acceleration [m/s^2] of the vertices in a step dt of the flow, None without a solution."""
     try:
         return _acceleration(coupled, start, t, dt, dt, velocity, solve)
     except StepFailed:
         return None
-    finally:
-        coupled.restore(initial)
 
 
 def _decay(coupled: Coupled, start: Start, acceleration: Array, braked: Array, dt: float) -> float:

@@ -181,7 +181,12 @@ def read_series(folder: Path, mirror: Mirror) -> list[Series]:
         parts = unpack(packed, Path(tempfile.mkdtemp(dir=mirror.folder)))
     else:
         parts = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
-    return sorted(mirror.whole(parts), key=lambda series: (not is_flow(series[-1][1]), not is_dry(series[-1][1])))
+    return sorted(mirror.whole(parts), key=_layer)
+
+
+def _layer(series: Series) -> tuple[bool, bool]:
+    kinds = import_pyvista().read(series[-1][1]).cell_data
+    return "fluid_fraction" not in kinds, "dry" not in kinds
 
 
 def plot_state(path: Path, moment: Moment, name: str, labels: Labels) -> Path:
