@@ -14,9 +14,9 @@ from solvers.api import Array
 
 def motion_of_obstacle(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
     """A function: time [s] -> positions of the points [m]; None if they are at rest."""
-    assert case.contact is not None
-    if name in case.contact.obstacles:
-        movement = case.contact.obstacles[name].motion
+    obstacles = {} if case.contact is None else case.contact.obstacles
+    if name in obstacles:
+        movement = obstacles[name].motion
         if isinstance(movement, tuple):
             components = movement
             return lambda t: points + np.stack([component(points.T, t) for component in components], axis=1)

@@ -24,15 +24,18 @@ MANY_NAMES = 15  #: bodies, from which the legend alone has their names
 MANY_ENTRIES = 40  #: of the legend
 FILLED = {"elastic": 0.55, "free": 0.55, "moved": 0.35, "rigid": 0.25, "obstacle": 0.25}  #: kind -> opacity
 # Bodies have COLOURS; what is no body has others.
+PATCHES = {"no slip": "black", "velocity": "#00207f", "outflow": "#5f7f1f", "periodic": "#7f5f1f"}
 MARK_COLOURS = {
     "support": "black",
     "spring": "dimgray",
     "traction": "#8b2500",
     "pressure": "#8b3a8b",
     "force": "#8b2500",
+    "motion": "#006400",
+    "velocity": PATCHES["velocity"],
 }
-PATCHES = {"no slip": "black", "velocity": "#00207f", "outflow": "#5f7f1f", "periodic": "#7f5f1f"}
 OTHER_PATCH = "#7f7f7f"
+ARROW_LENGTH = 0.08  #: of the scene's size
 NEAR = "#cc0000"  #: of the line between the surfaces of a pair
 
 Entry = tuple[Any, str, str]  #: colour, words, marker of a point or line; empty: a surface
@@ -79,6 +82,8 @@ def entries(scene: Preview, unit: str) -> Iterator[Entry]:
         yield NEAR, f"pair {words_of(pair, unit)}", "."
     for part in scene.patches:
         yield PATCHES.get(part.kind, OTHER_PATCH), f"patch {part.name} ({part.kind})", ""
+    for kind in sorted({arrow.kind for arrow in scene.arrows} & {"motion"}):
+        yield MARK_COLOURS[kind], "begins to move", "$\\rightarrow$"
     for name in scene.probes:
         yield "black", f"probe {name}", "+"
 
@@ -91,6 +96,16 @@ def closest(pairs: list[DistantPair]) -> list[DistantPair]:
         if bodies not in found or pair.distance < found[bodies].distance:
             found[bodies] = pair
     return list(found.values())
+
+
+def arrow_ends(scene: Preview, size: float) -> Iterator[tuple[Array, str]]:
+    """(from, to) of each arrow, shape (2, dim) [m], and its kind: loads end at the point that has them.
+
+    Motions and velocities begin there. size: of the scene [m].
+    """
+    for arrow in scene.arrows:
+        ends = np.array([0.0, 1.0] if arrow.kind in ("motion", "velocity") else [-1.0, 0.0])
+        yield arrow.at + ARROW_LENGTH * size * np.outer(ends, arrow.direction), arrow.kind
 
 
 def words_of(pair: DistantPair, unit: str) -> str:
@@ -160,6 +175,9 @@ def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mappi
         axes.plot(*mark.at, "^", color=MARK_COLOURS[mark.kind], markersize=8, zorder=7)
     for point in scene.probes.values():
         axes.plot(*point[:2], "+", color="black", markersize=9, zorder=7)
+    for ends, kind in arrow_ends(scene, float((high - low).max())):
+        looks = {"arrowstyle": "-|>", "color": MARK_COLOURS[kind], "linewidth": 1.8, "mutation_scale": 14}
+        axes.annotate("", ends[1], ends[0], arrowprops={**looks, "shrinkA": 0, "shrinkB": 0}, zorder=9)
     margin = 0.03 * (high - low).max()
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
@@ -233,6 +251,9 @@ def _draw_space(figure: Any, scene: Preview, low: Array, high: Array) -> None:
         plotter.add_mesh(pyvista.Box(np.column_stack(scene.box).ravel()).outline(), color="black", line_width=2)
     for point in scene.points:
         plotter.add_mesh(import_pyvista().PolyData(point.at[None]), color=MARK_COLOURS[point.kind], point_size=14)
+    for ends, kind in arrow_ends(scene, float((high - low).max())):
+        shaft = pyvista.Arrow(start=ends[0], direction=ends[1] - ends[0], scale="auto")
+        plotter.add_mesh(shaft, color=MARK_COLOURS[kind], lighting=False)
     if scene.probes:
         plotter.add_mesh(pyvista.PolyData(np.array(list(scene.probes.values()))), color="black", point_size=14)
     if len(scene.bodies) < MANY_NAMES:

@@ -10,7 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from fsci.preview.draw import FILLED, MARK_COLOURS, NEAR, OTHER_PATCH, PATCHES, closest, colours_of, loops_of, words_of
+from fsci.preview.draw import (
+    FILLED,
+    MARK_COLOURS,
+    NEAR,
+    OTHER_PATCH,
+    PATCHES,
+    arrow_ends,
+    closest,
+    colours_of,
+    loops_of,
+    words_of,
+)
 from fsci.preview.parts import NamedSurface, Preview
 from fsci.running.files import write_text
 from solvers.api import Array
@@ -135,6 +146,8 @@ def _parts(scene: Preview, unit: str) -> Iterator[dict[str, Any]]:
         yield {**_part(pair.name, NEAR, pair.ends, lines, width=3, words=f"pair {words_of(pair, unit)}"), "top": True}
     size = 0.01 * float(np.ptp(np.concatenate([part.corners.reshape(-1, part.corners.shape[2])
                                                for part in scene.bodies + scene.patches]), axis=0).max())  # fmt: skip
+    for ends, kind in arrow_ends(scene, 100.0 * size):
+        yield {**_part(kind, MARK_COLOURS[kind], *_head(ends), width=3, words=""), "top": True}
     points = [(p.name, MARK_COLOURS[p.kind], p.at, f"{p.kind} at a point of {p.name}") for p in scene.points]
     points += [(name, "black", point, f"probe {name}") for name, point in scene.probes.items()]
     for name, colour, point, words in points:
@@ -188,6 +201,17 @@ def _grid(scene: Preview) -> tuple[Array, list[list[int]]]:
         [(low[0], y), (high[0], y)] for y in scene.planes[1]
     ]
     return np.array(ends).reshape(-1, 2), [[2 * n, 2 * n + 1] for n in range(len(ends))]
+
+
+def _head(ends: Array) -> tuple[Array, list[list[int]]]:
+    """Points and lines of an arrow with two barbs, in space four."""
+    start, end = _in_space(ends)
+    along = end - start
+    across = np.cross(along, [0.0, 0.0, 1.0] if ends.shape[1] == 2 else np.eye(3)[np.abs(along).argmin()])
+    across *= np.linalg.norm(along) / np.linalg.norm(across)
+    sides = [across] if ends.shape[1] == 2 else [across, np.cross(along, across) / np.linalg.norm(along)]
+    barbs = [end - 0.25 * along + 0.12 * sign * side for side in sides for sign in (1.0, -1.0)]
+    return np.array([start, end, *barbs]), [[0, 1], *([1, 2 + number] for number in range(len(barbs)))]
 
 
 def _in_space(points: Array) -> Array:

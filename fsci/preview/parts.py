@@ -11,8 +11,17 @@ from scipy.spatial import cKDTree
 from fsci.case import Case, CaseError
 from fsci.case.contact import PairSection
 from fsci.check.meshes import check_meshes
+from fsci.expression import Expression
 from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, read_rigid_side
+from fsci.preview.arrows import (
+    Arrow,
+    arrow_of_moved,
+    arrow_of_pressure,
+    arrow_of_support,
+    arrow_of_vector,
+    moments,
+)
 from solvers.api import Array
 from solvers.mesh.distance import nearest_points
 from solvers.mesh.mesh import Mesh
@@ -73,6 +82,7 @@ class Preview:
     pairs: list[DistantPair]
     probes: dict[str, Array]
     points: list[NamedPoint]  #: that are held, or that springs and forces act at
+    arrows: list[Arrow]  #: of loads, motions and prescribed velocities
     box: tuple[Array, Array] | None = None
     planes: tuple[Array, ...] = ()  #: of the grid, along each axis
     cells: list[Array] = field(default_factory=list)  #: (low, high) corners of nested cells
@@ -87,17 +97,27 @@ def preview_of(case: Case) -> Preview:
     probes = {name: np.asarray(probe.at) for name, probe in case.probes.items() if probe.at is not None}
     pairs = [pair for name, settings in found.pairs.items() if (pair := _pair(case, name, settings)) is not None]
     points = [*_points_of_elastic(case), *_points_of_free(case)]
+    marks, arrows = list(_marks(case)), list(_arrows(case, bodies))
     if case.fluid is None:
-        return Preview(case.title, bodies, list(_marks(case)), [], pairs, probes, points)
+        return Preview(case.title, bodies, marks, [], pairs, probes, points, _drawn(arrows))
     section = case.fluid.grid
     low, high = np.asarray(section.start, dtype=float), np.asarray(section.to, dtype=float)
-    patches = [
-        NamedSurface(name, patch.kind.replace("_", " "), np.concatenate([_face(low, high, face) for face in patch.on]))
-        for name, patch in case.fluid.patches.items()
-    ]
     planes = tuple(np.asarray(edge) for edge in section.planes)
+    patches = []
+    # A patch on a part of a face is drawn over one on all of it.
+    for name, patch in sorted(case.fluid.patches.items(), key=lambda item: item[1].where is not None):
+        facets = [_face(planes, face, patch.where) for face in patch.on]
+        patches.append(NamedSurface(name, patch.kind.replace("_", " "), np.concatenate(facets)))
+        if patch.velocity is not None:
+            arrows += [arrow_of_vector("velocity", part, patch.velocity, moments(case)) for part in facets if len(part)]
     cells = list(_nested_cells(case)) if section.refine else []
-    return Preview(case.title, bodies, list(_marks(case)), patches, pairs, probes, points, (low, high), planes, cells)
+    return Preview(
+        case.title, bodies, marks, patches, pairs, probes, points, _drawn(arrows), (low, high), planes, cells
+    )
+
+
+def _drawn(arrows: Sequence[Arrow | None]) -> list[Arrow]:
+    return [arrow for arrow in arrows if arrow is not None]
 
 
 def _bodies(case: Case) -> Iterator[NamedSurface]:
@@ -115,8 +135,7 @@ def _bodies(case: Case) -> Iterator[NamedSurface]:
 
 
 def _surface(mesh: Mesh, names: Sequence[str] | None, name: str, kind: str) -> NamedSurface:
-    facets, nodes = tessellate(mesh, names)
-    return NamedSurface(name, kind, mesh.points[nodes][facets])
+    return NamedSurface(name, kind, _corners(mesh, names))
 
 
 def _marks(case: Case) -> Iterator[NamedSurface]:
@@ -131,12 +150,49 @@ def _marks(case: Case) -> Iterator[NamedSurface]:
                     yield _surface(mesh, on, f"{name}.{' + '.join(on)}", kind)
 
 
+def _arrows(case: Case, bodies: Sequence[NamedSurface]) -> Iterator[Arrow | None]:
+    """Of loads and motions."""
+    times = moments(case)
+    for name, body in case.elastic_bodies.items():
+        mesh = read_body(case, name)
+        known = set(mesh.surfaces)
+        for support in body.supports:
+            if support.at is not None:
+                yield arrow_of_support(np.asarray(support.at)[None, None], support, times)
+            elif set(support.on or ()) <= known:
+                yield arrow_of_support(_corners(mesh, support.on), support, times)
+        for traction in body.tractions:
+            yield arrow_of_vector("traction", _corners(mesh, traction.on), traction.value, times)
+        for pressure in body.pressures:
+            yield arrow_of_pressure(_corners(mesh, pressure.on), pressure.value, times)
+        for load in body.point_forces:
+            if load.at is not None:
+                yield arrow_of_vector("force", np.asarray(load.at)[None, None], load.value, times)
+    for part in bodies:
+        if part.kind in ("moved", "obstacle"):
+            yield arrow_of_moved(case, part.name, np.unique(part.corners.reshape(-1, part.corners.shape[2]), axis=0))
+    centres = {part.name: part.middle for part in bodies}
+    for name, free in (case.rigid or {}).items():
+        for given in free.loads:
+            if given.force is not None:
+                at = centres[name] if given.at is None else np.asarray(given.at)
+                yield arrow_of_vector("force", at[None, None], given.force, times)
+
+
+def _corners(mesh: Mesh, on: Sequence[str] | None) -> Array:
+    facets, nodes = tessellate(mesh, on)
+    return mesh.points[nodes][facets]
+
+
 def _points_of_elastic(case: Case) -> Iterator[NamedPoint]:
-    """Supports at points of elastic bodies."""
+    """Supports and forces at points of elastic bodies."""
     for name, body in case.elastic_bodies.items():
         for support in body.supports:
             if support.at is not None:
                 yield NamedPoint(name, "support", np.asarray(support.at))
+        for load in body.point_forces:
+            if load.at is not None:
+                yield NamedPoint(name, "force", np.asarray(load.at))
 
 
 def _points_of_free(case: Case) -> Iterator[NamedPoint]:
@@ -185,16 +241,20 @@ def nearest(one: Array, other: Array) -> Array:
     return best[1]
 
 
-def _face(low: Array, high: Array, face: str) -> Array:
-    """A face of the box, such as x-, as segments or triangles."""
-    axis, dim = "xyz".index(face[0]), len(low)
-    place = low[axis] if face[1] == "-" else high[axis]
-    others = [i for i in range(dim) if i != axis]
-    counts = np.array(np.meshgrid(*([[0, 1]] * (dim - 1)), indexing="ij")).reshape(dim - 1, -1).T
-    corners = np.empty((len(counts), dim))
-    corners[:, axis] = place
-    corners[:, others] = low[others] + counts * (high - low)[others]
-    return corners[[[0, 1]]] if dim == 2 else corners[[[0, 1, 3], [0, 3, 2]]]
+def _face(planes: Sequence[Array], face: str, where: Expression | None) -> Array:
+    """A face of the box, such as x-, as segments or triangles; of cells in whose middle `where` is positive."""
+    axis, dim = "xyz".index(face[0]), len(planes)
+    place = planes[axis][0 if face[1] == "-" else -1]
+    others = [edges if where is not None else edges[[0, -1]] for i, edges in enumerate(planes) if i != axis]
+    low = np.stack(np.meshgrid(*(edges[:-1] for edges in others), indexing="ij"), axis=-1).reshape(-1, dim - 1)
+    high = np.stack(np.meshgrid(*(edges[1:] for edges in others), indexing="ij"), axis=-1).reshape(-1, dim - 1)
+    if where is not None:
+        inside = where(np.insert((low + high) / 2.0, axis, place, axis=1).T, 0.0) > 0.0
+        low, high = low[inside], high[inside]
+    steps = np.array(np.meshgrid(*([[0, 1]] * (dim - 1)), indexing="ij")).reshape(dim - 1, -1).T
+    corners = np.insert(low[:, None] + steps * (high - low)[:, None], axis, place, axis=2)
+    simplices = [[0, 1]] if dim == 2 else [[0, 1, 3], [0, 3, 2]]
+    return corners[:, simplices].reshape(-1, dim, dim)
 
 
 def _nested_cells(case: Case) -> Iterator[Array]:

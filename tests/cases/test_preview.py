@@ -148,6 +148,53 @@ def test_points_that_are_held_or_loaded(tmp_path):
     assert "force at a point of loose" in (tmp_path / "all.html").read_text()
 
 
+LOADS = """supports: [{on: inner, displacement: [0, "0.1*sin(6*t)"]}]
+      tractions: [{on: outer, value: ["t-2*t*t", 0]}]
+      pressures: [{on: inner, value: 1}]
+      point_forces: [{at: [0.7, 0.5], value: ["t", "-t"]}]"""
+TURNED = """turned:
+      mesh: {shape: rectangle, size: [0.4, 0.04], cells: [4, 1], origin: [1.2, 0.78]}
+      motion: {rotation: {centre: [1.4, 0.8], angular_velocity: 3000}}
+    loose: {"""
+MOVED = (
+    PLANE.replace("supports: [{on: inner, displacement: [0, 0]}]", LOADS)
+    .replace("on: [y-, y+], no_slip", "on: [x-, y-, y+], no_slip")
+    .replace('velocity: ["y*(1-y)", 0]}', 'velocity: ["exp(-t)*y*(1-y)", 0], where: "0.35-y"}')
+    .replace("motion: {velocity: [0.1, 0]}", 'motion: {displacement: ["where(t < 0.5, 0, 0.1*(t-0.5))", 0]}')
+    .replace("loose: {", TURNED)
+)
+
+
+def test_which_way_loads_act_and_motions_begin(tmp_path):
+    """The traction is largest when it pulls back, turns begin along the circle, pressures in a ring cancel."""
+    scene = preview_of(written(tmp_path, MOVED))
+    found = {(arrow.kind, *np.round(arrow.at, 3)): arrow.direction for arrow in scene.arrows}
+    (corner,) = [key for key in found if key[0] == "motion" and key[1] not in (0.5, 1.4)]
+    assert corner[1:] in {(1.2, 0.78), (1.6, 0.78), (1.2, 0.82), (1.6, 0.82)}
+    around = np.array([0.8 - corner[2], corner[1] - 1.4]) / np.hypot(corner[1] - 1.4, corner[2] - 0.8)
+    assert found.pop(corner) @ around > 0.99
+    assert found == {
+        ("motion", 0.5, 0.5): pytest.approx([0, 1]),
+        ("motion", 1.4, 0.5): pytest.approx([1, 0]),
+        ("traction", 0.5, 0.5): pytest.approx([-1, 0]),
+        ("force", 0.7, 0.5): pytest.approx([0.5**0.5, -(0.5**0.5)]),
+        ("velocity", 0, 0.15): pytest.approx([1, 0]),
+    }
+    assert fsci("preview", tmp_path, "-o", tmp_path / "all.png").returncode == 0
+    assert fsci("preview", tmp_path, "-o", tmp_path / "all.html").returncode == 0
+
+
+def test_a_pressure_in_space(tmp_path):
+    (arrow,) = [arrow for arrow in preview_of(written(tmp_path, SPACE)).arrows if arrow.kind == "pressure"]
+    assert (*arrow.at, *arrow.direction) == pytest.approx((0.45, 0.25, 0.77, 0, 1, 0))
+
+
+def test_a_patch_on_a_part_of_a_face_is_that_part(tmp_path):
+    """Of cells whose middle is below 0.35."""
+    (inlet,) = [part for part in preview_of(written(tmp_path, MOVED)).patches if part.name == "inlet"]
+    assert inlet.corners.max(axis=(0, 1)) == pytest.approx([0, 0.3])
+
+
 def test_surfaces_that_touch_but_for_rounding_touch(tmp_path):
     scene = preview_of(written(tmp_path, SPACE.replace("0.52]", "0.50000000000000011]")))
     assert "pair blocks: high.bottom, low.top, touching" in [text for _, text, _ in entries(scene, "m")]
