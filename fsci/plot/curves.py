@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from fsci.running.history import COLUMNS, History
 
 CURVE_SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
 PANEL = 2.2  #: height of each of several panels [inch]
+MOST_ROWS = 6  #: panels above each other; more stand in columns
 CURVE_DOTS = 200  #: per inch
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  #: told apart by colour-blind readers
 CURVE_STYLE: Any = {
@@ -117,7 +119,10 @@ def scaled(
 
 
 def contact_panels(history: History, units: Mapping[str, str], *, flat: bool = False) -> dict[str, dict[str, Any]]:
-    """Label -> curves: the force of each pair of surfaces, then other numbers of theirs, then counts of nodes."""
+    """Label -> curves: the force of each pair of surfaces, then other numbers of theirs, then counts of nodes.
+
+    Pairs that never touch have none, unless nothing touches.
+    """
     panels: dict[tuple[str, str], dict[str, Any]] = {}
     for name, values in history.items():
         pair, _, number = name.removeprefix(CONTACT_PREFIX).rpartition(".")
@@ -132,6 +137,9 @@ def contact_panels(history: History, units: Mapping[str, str], *, flat: bool = F
             panels[f"contact {number} of {pair}", f"contact_{number}"] = {"": values}
         else:
             panels.setdefault((NODES, ""), {})[number] = values
+    still = {panel for panel, curves in panels.items() if panel[1] == "force" and not any(map(np.any, curves.values()))}
+    if len(still) < sum(quantity == "force" for _, quantity in panels):
+        panels = {panel: curves for panel, curves in panels.items() if panel not in still}
     found = {}
     forces = [curve for (_, quantity), curves in panels.items() if quantity == "force" for curve in curves.values()]
     for (text, quantity), curves in sorted(panels.items(), key=lambda panel: panel[0][0] == NODES):
@@ -143,16 +151,20 @@ def contact_panels(history: History, units: Mapping[str, str], *, flat: bool = F
 def plot_panels(
     path: Path, time: Any, panels: Mapping[str, Mapping[str, Any]], below: str, *, logarithmic: bool = False
 ) -> Path:
-    """Draws curves over time in panels above each other, label -> name -> values; counts of nodes as steps."""
+    """Draws curves over time in columns of panels, label -> name -> values; counts of nodes as steps."""
     import matplotlib
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(CURVE_STYLE):
-        height = max(CURVE_SIZE[1], PANEL * len(panels))
-        figure = Figure((CURVE_SIZE[0], height), dpi=CURVE_DOTS, layout="constrained")
-        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        columns = math.ceil(len(panels) / MOST_ROWS)
+        rows = math.ceil(len(panels) / columns)
+        size = columns * CURVE_SIZE[0], max(CURVE_SIZE[1], PANEL * rows)
+        figure = Figure(size, dpi=CURVE_DOTS, layout="constrained")
+        places = figure.subplots(rows, columns, sharex=True, squeeze=False).T.ravel()
         marker = "o" if len(time) < 30 else ""
-        for axes, (beside, curves) in zip(rows, panels.items(), strict=True):
+        for axes in places[len(panels) :]:
+            axes.remove()
+        for number, (axes, (beside, curves)) in enumerate(zip(places, panels.items(), strict=False), 1):
             scaled = logarithmic and any(np.any(values > 0) for values in curves.values())
             for index, (name, values) in enumerate(curves.items()):
                 style = {"color": COLOURS[index % len(COLOURS)], "marker": marker, "label": literal(name)}
@@ -163,7 +175,9 @@ def plot_panels(
             axes.set_title(beside, loc="left", fontsize=CURVE_STYLE["font.size"])
             if len(curves) > 1:
                 add_legend(axes)
-        rows[-1].set_xlabel(below)
+            if number % rows == 0 or number == len(panels):
+                axes.set_xlabel(below)
+                axes.tick_params(labelbottom=True)
         save_figure(figure, path)
     return path
 

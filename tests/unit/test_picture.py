@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fsci.plot import movie
 from fsci.plot.curves import contact_panels, plot_history
@@ -220,6 +221,18 @@ def test_balances_and_contact_are_a_picture_each(tmp_path):
         "contact force on ball [N]": ["x"],
         "contact nodes": ["active"],
     }
+
+
+def test_many_bodies_in_contact(tmp_path):
+    """Panels stand in columns; bodies that touch nothing have none, unless none of them touches anything."""
+    time = np.linspace(0, 1, 40)
+    history = {"time": time} | {f"contact.on_{name}.x": (name != "c") * time for name in "abcdefghijklmno"}
+    (drawn,) = plot_history(tmp_path, history, {}, SI)
+    with Image.open(drawn) as picture:
+        assert picture.size == (3 * 1600, 2200)  # 14 panels in 3 columns of 5
+    assert "contact force on c [N]" not in contact_panels(history, SI)
+    still = {name: 0.0 * values for name, values in history.items()}
+    assert len(contact_panels(still, SI)) == 15
 
 
 def test_a_broken_off_run_without_fields_or_summary_is_drawn(tmp_path):
