@@ -51,7 +51,7 @@ def plot_story(
     low, high = bounds[:, :4:2].min(axis=0), bounds[:, 1:4:2].max(axis=0)
     names, plane = states[0][1:]
     crop = BOARD_CROP[not plane]
-    limits = (0.0, max(float(np.percentile(speed, 100 - crop)) for speed in speeds) or 1.0)
+    limits = (0.0, largest_shown([float(np.percentile(speed, 100 - crop)) for speed in speeds]))
     length = unit_of("displacement", units, float(np.abs([low, high]).max()))
     unit = field_unit("velocity", limits, units)
     columns, rows = arrange(len(states), *(high - low))
@@ -84,6 +84,14 @@ def plot_story(
         draw_colour_bar(figure, place, shown_limits, "viridis", field_label("velocity", flows, unit), extend="max")
         save_figure(figure, path)
     return path
+
+
+def largest_shown(speeds: Sequence[float]) -> float:
+    """The end of the scale of colours: the largest speed of all panels, or twice that of the panel in the middle.
+
+    One moment that is much faster than the others would make all of them dark.
+    """
+    return min(max(speeds), 2.0 * float(np.median(speeds)) or np.inf) or 1.0
 
 
 def choose(count: int, needed: Sequence[int] = ()) -> list[int]:

@@ -10,7 +10,7 @@ import pytest
 from fsci.plot.picture import look_at, plot_run
 from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane, surrounds
-from fsci.plot.storyboard import arrange, boundary, choose, plane_state
+from fsci.plot.storyboard import arrange, boundary, choose, largest_shown, plane_state
 from fsci.running.output import FieldWriter
 from solvers.api import Snapshot
 
@@ -68,6 +68,13 @@ def test_which_times_are_shown():
     assert choose(13) == [2, 4, 6, 8, 10, 12]
     assert choose(13, [9]) == [2, 4, 6, 9, 10, 12]
     assert choose(13, [12]) == choose(13)
+
+
+@pytest.mark.parametrize(("speeds", "largest"), [
+    ([1, 2, 3, 4, 5, 6], 6), ([0.1, 0.1, 9, 0.2, 0.1], 0.2), ([0, 0, 0, 3], 3), ([0], 1), ([4], 4),
+])  # fmt: skip
+def test_one_fast_moment_does_not_make_the_others_dark(speeds, largest):
+    assert largest_shown(speeds) == largest
 
 
 def test_panels_fill_a_page():
