@@ -85,7 +85,7 @@ class Contact:
         self.present = np.ones(len(self.pairs), dtype=bool)
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
-        self._stiffness = np.zeros(count)  # per area [Pa/m], at the latest evaluation
+        self.stiffness_per_area = np.zeros(count)  #: [Pa/m], at the latest evaluation
         self._stiffnesses = ContactStiffness(self.interface, np.zeros_like(self.x))
         extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
         self._touching = max(GAP_OF_EXTENT * extent, GAP_OF_DISTANCE * far)  # gaps [m]
@@ -233,14 +233,14 @@ class Contact:
         constrained = self._constraints.choose(found.terms)
         self._covers, self._shared = constrained.covers, constrained.shared
         self._spans, self.merged = constrained.spans, constrained.merged
-        self._stiffness = self._stiffnesses.per_area(constrained.terms.M)
+        self.stiffness_per_area = self._stiffnesses.per_area(constrained.terms.M)
         self.slip = self._integration.slip(self.x, found, self._shared)
         return constrained.terms
 
     def point(self, which: NDArray[np.int64]) -> Point:
         """The arguments of a law for some multipliers."""
         assert self.terms is not None
-        stiffness, slip = self._stiffness[which], self.slip
+        stiffness, slip = self.stiffness_per_area[which], self.slip
         return Point(
             z=self.z[which],
             normals=self.terms.normals[which],

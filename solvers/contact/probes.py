@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 
 from solvers.api import Array
+from solvers.contact.areas import touching_area
 from solvers.contact.contact import Contact
-from solvers.contact.law.law import OPEN, STICK
 from solvers.contact.surface import Surface
 from solvers.kernels import nodal_normals
 from solvers.mesh.cell_types import CELL_TYPES
@@ -71,20 +71,15 @@ AreaQuantity = Literal["contact_area", "stick_area", "mean_pressure"]
 def of_area(contact: Contact, pair: int, quantity: AreaQuantity) -> Probe:
     """Probe of the area [m^2] (length in 2D) in which a pair touches or sticks, or the mean pressure [Pa] in contact.
 
-    Each slave node has the area int Phi_j over what the master covers, so that mean pressure times area is the normal
-    force. All are zero without contact.
+    Mean pressure times area is the normal force. All are zero without contact.
     """
 
     def probe() -> dict[str, float]:
-        if contact.terms is None:
-            return {"": 0.0}
-        status = contact.active_set.status
-        area = contact.terms.D_of_pair[pair] * (status == STICK if quantity == "stick_area" else status != OPEN)
-        total = float(area.sum())
-        if quantity != "mean_pressure":
-            return {"": total}
-        force = float(area @ np.einsum("nd,nd->n", contact.z, contact.terms.normals))
-        return {"": force / total if total > 0.0 else 0.0}
+        area = touching_area(contact, pair, sticking=quantity == "stick_area")
+        if quantity != "mean_pressure" or contact.terms is None:
+            return {"": area}
+        force = float(contact.terms.D_of_pair[pair] @ np.einsum("nd,nd->n", contact.z, contact.terms.normals))
+        return {"": force / area if area > 0.0 else 0.0}
 
     return probe
 
