@@ -79,7 +79,7 @@ def pairs(text, folder):
     ("scheme", "condition"),
     [
         ("monolithic", "no_slip"),
-        ("partitioned", "slip"),
+        pytest.param("partitioned", "slip", marks=pytest.mark.slow),
         pytest.param("monolithic", "slip", marks=pytest.mark.slow),
         pytest.param("monolithic", "symmetry", marks=pytest.mark.slow),
     ],
@@ -107,6 +107,7 @@ def test_with_fluid_below_it_the_floor_carries_the_weight_less_the_buoyancy(tmp_
     assert force == pytest.approx(WEIGHT - buoyancy, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_block_in_space(tmp_path):
     found = run(changed(BLOCK, *SPACE.items()), tmp_path)
     weight = 0.4 * WEIGHT
@@ -387,6 +388,7 @@ def test_walls_in_space(tmp_path):
         assert np.count_nonzero(normal) == 1
 
 
+@pytest.mark.slow
 def test_two_processes(tmp_path):
     """The force when the floor has come in, to 1e-10."""
     (tmp_path / "case.yaml").write_text(changed(BLOCK, ("0.333, 0.05", "0.333, 0.02"), ("end: 0.8", "end: 0.16")))

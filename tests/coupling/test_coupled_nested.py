@@ -127,7 +127,11 @@ def test_cells_follow_a_free_body(sinking, tmp_path):
 
 @pytest.mark.parametrize(
     ("processes", "end"),
-    [(2, 0.28), pytest.param(2, 0.46, marks=pytest.mark.slow), pytest.param(3, 0.28, marks=pytest.mark.slow)],
+    [
+        pytest.param(2, 0.28, marks=pytest.mark.slow),
+        pytest.param(2, 0.46, marks=pytest.mark.slow),
+        pytest.param(3, 0.28, marks=pytest.mark.slow),
+    ],
 )
 def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
     """While it sinks by more than one large cell."""
@@ -141,9 +145,8 @@ def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
         assert differ(one, several, name) < 1e-8, name
 
 
-@pytest.mark.parametrize(
-    "text", [pytest.param(NESTED, id="post"), pytest.param(BALL, id="ball", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [pytest.param(NESTED, id="post"), pytest.param(BALL, id="ball")])
 def test_two_processes(text, tmp_path, nested):
     one = nested[1] if text is NESTED else run(text, tmp_path)
     (tmp_path / "case.yaml").write_text(text)

@@ -119,6 +119,9 @@ def test_all_schemes_agree(whole, monolithic):
     assert np.abs(history["force.x"] - expected["force.x"]).max() < 1e-5 * np.abs(expected["force.x"]).max()
 
 
+@pytest.mark.parametrize(
+    "whole", ["monolithic", *(pytest.param(name, marks=pytest.mark.slow) for name in ("iqn", "aitken"))], indirect=True
+)
 def test_directions_that_span_the_plane_hold_all(whole, tmp_path):
     """A foot held along two directions that are no axes is the clamped one, whatever couples fluid and structure."""
     scheme, _, expected = whole
@@ -141,6 +144,7 @@ def test_balances_are_in_the_history(whole):
     assert np.abs(history["fluid.mass"]).max() < 1e-9
 
 
+@pytest.mark.parametrize("whole", ["monolithic", "iqn", pytest.param("aitken", marks=pytest.mark.slow)], indirect=True)
 def test_resumed_bit_for_bit(whole, tmp_path):
     scheme, _, expected = whole
     (tmp_path / "case.yaml").write_text(with_scheme(scheme))
@@ -203,11 +207,11 @@ def test_a_case_that_fails_at_once_says_so_and_keeps_a_checkpoint(tmp_path):
 @pytest.mark.parametrize(
     ("text", "scheme"),
     [
-        pytest.param(POST, "monolithic", id="post-monolithic"),
+        pytest.param(POST, "monolithic", id="post-monolithic", marks=pytest.mark.slow),
         pytest.param(POST, "iqn", id="post-iqn", marks=pytest.mark.slow),
         pytest.param(BLOCK, "monolithic", id="block-monolithic", marks=pytest.mark.slow),
         pytest.param(BLOCK, "iqn", id="block-iqn", marks=pytest.mark.slow),
-        pytest.param(MEETING, "monolithic", id="contact-monolithic"),
+        pytest.param(MEETING, "monolithic", id="contact-monolithic", marks=pytest.mark.slow),
         pytest.param(MEETING, "iqn", id="contact-iqn", marks=pytest.mark.slow),
     ],
 )

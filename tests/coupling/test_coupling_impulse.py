@@ -67,10 +67,10 @@ def speeds(folder, text, name="v.x"):
     ("scheme", "coupling", "step", "steps"),
     [
         ("bdf2", "monolithic", 0.02, 12),
-        ("bdf2", "monolithic", 0.002, 16),
+        pytest.param("bdf2", "monolithic", 0.002, 16, marks=pytest.mark.slow),
         ("bdf2", "partitioned", 0.02, 4),
-        ("bdf2_optimized", "monolithic", 0.02, 8),
-        ("backward_euler", "monolithic", 0.02, 8),
+        pytest.param("bdf2_optimized", "monolithic", 0.02, 8, marks=pytest.mark.slow),
+        pytest.param("backward_euler", "monolithic", 0.02, 8, marks=pytest.mark.slow),
     ],
 )
 def test_cylinder_in_a_round_tank(tmp_path, scheme, coupling, step, steps):
@@ -235,6 +235,7 @@ output: {{fields_every: 0}}
 """
 
 
+@pytest.mark.slow
 def test_ball_in_space(tmp_path):
     """The velocity that stays belongs to the impulse on a ball whose motion is given and starts with a jump.
 

@@ -119,6 +119,7 @@ def test_a_resumed_run_is_the_same(tmp_path):
         assert np.array_equal(part[column], whole[column]), column
 
 
+@pytest.mark.slow
 def test_two_processes(tmp_path):
     one = run(PUSHED, tmp_path / "one")
     path = tmp_path / "two.yaml"

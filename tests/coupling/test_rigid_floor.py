@@ -73,7 +73,9 @@ output: {fields_every: 0}
 """  # noqa: E501
 
 
-@pytest.mark.parametrize(("friction", "held"), [(0.5, False), (0.25, True), (0.1, True)])
+@pytest.mark.parametrize(
+    ("friction", "held"), [(0.5, False), (0.25, True), pytest.param(0.1, True, marks=pytest.mark.slow)]
+)
 def test_friction_with_the_floor_in_a_flow(tmp_path, friction, held):
     """A disc rolls as without a fluid. One that does not turn rests below the angle of friction, or slides."""
     texts = [

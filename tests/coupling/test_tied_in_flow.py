@@ -120,7 +120,7 @@ def run(folder, text):
 @pytest.mark.parametrize(
     ("pair", "cells", "scheme", "x"),
     [
-        (f"slave: {HIGH}, master: {LOW}", 5, "monolithic", 0.81),
+        pytest.param(f"slave: {HIGH}, master: {LOW}", 5, "monolithic", 0.81, marks=pytest.mark.slow),
         pytest.param(f"slave: {LOW}, master: {HIGH}", 5, "monolithic", 0.81 + 0.05 / 3, marks=pytest.mark.slow),
         pytest.param(f"slave: {HIGH}, master: {LOW}", 4, "partitioned", 0.81, marks=pytest.mark.slow),
     ],
