@@ -265,6 +265,7 @@ def test_constants_of_gaps(in_gaps, monkeypatch, module, name, value, same):
     assert drags_in_gaps() == pytest.approx(in_gaps, rel=same)
 
 
+@pytest.mark.slow
 def test_largest_amplification_of_an_extension(monkeypatch):
     """2D-1 is the same over three decades; with lines everywhere (1) its pressure difference is worse."""
 

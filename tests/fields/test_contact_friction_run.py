@@ -139,7 +139,7 @@ def tension_at_the_end(folder, friction, moved, cells=45):
     [("{coefficient: 0.3}", np.exp(0.3 * np.pi / 1.01), 6e-3), ("{bound: 0.2}", 1.0 + 0.2 * np.pi / 1.01, 2e-3)],
     ids=["coulomb", "tresca"],
 )
-@pytest.mark.parametrize("cells", [45, 90])
+@pytest.mark.parametrize("cells", [45, pytest.param(90, marks=pytest.mark.slow)])
 def test_belt_around_a_drum(tmp_path, friction, tension, error, cells):
     """The end turns with the belt, so that nothing bends.
 

@@ -187,7 +187,9 @@ def test_cylinder_in_motion():
     assert np.abs(np.diff(ratios[:, 1])).max() < 0.04  # it falls from 1.15 to 0.95, without jumps
 
 
-@pytest.mark.parametrize("gap", [pytest.param(1, marks=pytest.mark.slow), 0.5, 0.2])
+@pytest.mark.parametrize(
+    "gap", [pytest.param(1, marks=pytest.mark.slow), pytest.param(0.5, marks=pytest.mark.slow), 0.2]
+)
 def test_sphere_at_a_wall(gap):
     """Within 14 %; without the term 1.23 and 1.44."""
     ratio = drag_ratio(3, gap * H, H, "q1q1", growth=1.3, fine=0.6, size=5.0, narrow_gaps=True)

@@ -330,7 +330,8 @@ probes:
 COLUMNS = ("force.x", "force.y", "before", "behind", "rate", "energy", "volume", "fluid.mass")
 
 
-@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_two_processes(tmp_path, element):
     """A plate with both ends in the flow, and a run that goes on with other processes; all probes follow it."""
     (tmp_path / "case.yaml").write_text(CASE.format(element=element))
@@ -401,8 +402,14 @@ probes:
 """
 
 
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
-@pytest.mark.parametrize("flow", ["stokes", "navier_stokes"])
+@pytest.mark.parametrize(
+    ("element", "flow"),
+    [
+        ("q1q1", "stokes"),
+        ("q2q1", "navier_stokes"),
+        *(pytest.param(*other, marks=pytest.mark.slow) for other in (("q1q1", "navier_stokes"), ("q2q1", "stokes"))),
+    ],
+)
 def test_a_steady_flow_has_no_history(tmp_path, element, flow):
     """A thin plate that comes from seven cells away has the forces of one that has always been there."""
     found = []

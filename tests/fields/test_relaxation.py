@@ -110,8 +110,8 @@ def test_loss_of_a_standard_linear_solid():
     def look(structure):
         return on_top(structure)[0][0], structure.energy.damping
 
-    before = advance(structure, 3 * steps, h, look)[-1, 1]
-    stress, lost = advance(structure, steps, h, look, 3 * steps * h).T
+    before = advance(structure, 2 * steps, h, look)[-1, 1]
+    stress, lost = advance(structure, steps, h, look, 2 * steps * h).T
     t = h * np.arange(1, steps + 1)
     storage = 1.0 + b * (omega * tau) ** 2 / (1.0 + (omega * tau) ** 2)
     loss = b * omega * tau / (1.0 + (omega * tau) ** 2)

@@ -284,6 +284,7 @@ def test_a_resumed_ring_claps_alike(clapping, tmp_path):
         assert np.array_equal(clapping[name], resumed[name]), name
 
 
+@pytest.mark.slow
 def test_processes_clap_alike(clapping, tmp_path):
     (tmp_path / "case.yaml").write_text(CLAPPING)
     done = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=2)
