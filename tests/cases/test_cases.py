@@ -90,6 +90,8 @@ SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_ne
 
 #: in space, with forms that no other quick test has; their whole runs are slow tests
 DEAR = ("falling_sphere", "rebound_stokes", "sphere_tube", "torus_rough")
+#: in the plane, with what other cases have, too; their whole runs are slow tests
+DEAR += ("jeffery_orbit", "leaflet_pulsating", "falling_elastic_disc", "hopper")
 OTHERS = [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)]
 
 

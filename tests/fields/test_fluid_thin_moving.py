@@ -62,7 +62,9 @@ def test_plate_that_moves_along_a_channel(element, thickness, draws):
 
 
 @pytest.mark.parametrize("draws", DRAWS, ids=str)
-@pytest.mark.parametrize("thickness", [3.2, 3.5, 4.2, 5.0, 5.5])
+@pytest.mark.parametrize(
+    "thickness", [3.2, pytest.param(3.5, marks=pytest.mark.slow), 4.2, pytest.param(5.0, marks=pytest.mark.slow), 5.5]
+)
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_thicker_plate_that_hardly_moves(element, thickness, draws):
     """Strips behind both sides, of a cut cell and one more in any direction, would meet within five cells."""
@@ -71,7 +73,9 @@ def test_thicker_plate_that_hardly_moves(element, thickness, draws):
 
 
 @pytest.mark.parametrize("draws", DRAWS, ids=str)
-@pytest.mark.parametrize("thickness", [3.06, 3.3, 3.5, 4.2, 5.5])
+@pytest.mark.parametrize(
+    "thickness", [3.06, pytest.param(3.3, marks=pytest.mark.slow), 3.5, pytest.param(4.2, marks=pytest.mark.slow), 5.5]
+)
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_inclined_plate_that_hardly_moves(element, thickness, draws):
     """Inclined by 35 to 50 degrees, its strips would meet in diagonal directions."""

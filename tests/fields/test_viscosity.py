@@ -114,8 +114,17 @@ def test_derivative_by_the_displacement(cell_type, element):
     assert times(viscosity.turning(v), du) == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("damping", [Damping(), Damping(0.0, 1e-3), Damping(0.0, 0.1)], ids=["none", "weak", "strong"])
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(
+    ("dim", "damping"),
+    [
+        pytest.param(2, Damping(), id="2-none"),
+        pytest.param(2, Damping(0.0, 1e-3), id="2-weak"),
+        pytest.param(3, Damping(0.0, 0.1), id="3-strong"),
+        pytest.param(2, Damping(0.0, 0.1), id="2-strong", marks=pytest.mark.slow),
+        pytest.param(3, Damping(), id="3-none", marks=pytest.mark.slow),
+        pytest.param(3, Damping(0.0, 1e-3), id="3-weak", marks=pytest.mark.slow),
+    ],
+)
 def test_a_block_that_spins_keeps_its_spin(dim, damping):
     """Half a turn."""
     cell_type = "quad" if dim == 2 else "hexahedron"
