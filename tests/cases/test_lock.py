@@ -64,6 +64,7 @@ def test_a_second_run_is_refused(tmp_path, start, processes):
     assert fsci("resume", out, "--set", "time.step=1e5", processes=processes).returncode == 0
 
 
+@pytest.mark.slow
 def test_on_two_processes_the_first_holds_it(tmp_path, start):
     (tmp_path / "case.yaml").write_text(PLATE)
     out = tmp_path / "out"

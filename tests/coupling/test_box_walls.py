@@ -96,7 +96,8 @@ def test_the_floor_carries_the_weight_less_the_force_of_the_fluid(tmp_path, sche
     assert abs(found["contact.block_floor_y_low.x"][-1]) < 1e-9 * WEIGHT
 
 
-@pytest.mark.parametrize("film", [pytest.param("zone: wetted", marks=pytest.mark.slow), "roughness: 0.002"])
+@pytest.mark.slow
+@pytest.mark.parametrize("film", ["zone: wetted", "roughness: 0.002"])
 def test_with_fluid_below_it_the_floor_carries_the_weight_less_the_buoyancy(tmp_path, film):
     """Wetted and seeping contact have the pressure of the fluid below the block, too."""
     deep = changed(BLOCK, ("  viscosity: 0.1", "  viscosity: 0.1\n  gravity: [0, -10]"), ("end: 0.8", "end: 1.2"))

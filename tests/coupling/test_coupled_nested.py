@@ -158,7 +158,8 @@ def test_two_processes(text, tmp_path, nested):
 
 
 @pytest.mark.parametrize(
-    ("text", "whole", "middle", "end"), [(NESTED, "nested", "0.06", "0.1"), (SINKING, "sinking", "0.28", "0.46")]
+    ("text", "whole", "middle", "end"),
+    [pytest.param(NESTED, "nested", "0.06", "0.1", marks=pytest.mark.slow), (SINKING, "sinking", "0.28", "0.46")],
 )
 def test_resumed_bit_for_bit(text, whole, middle, end, tmp_path, request):
     _, uninterrupted = request.getfixturevalue(whole)

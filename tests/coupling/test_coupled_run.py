@@ -144,7 +144,9 @@ def test_balances_are_in_the_history(whole):
     assert np.abs(history["fluid.mass"]).max() < 1e-9
 
 
-@pytest.mark.parametrize("whole", ["monolithic", "iqn", pytest.param("aitken", marks=pytest.mark.slow)], indirect=True)
+@pytest.mark.parametrize(
+    "whole", ["monolithic", *(pytest.param(name, marks=pytest.mark.slow) for name in ("iqn", "aitken"))], indirect=True
+)
 def test_resumed_bit_for_bit(whole, tmp_path):
     scheme, _, expected = whole
     (tmp_path / "case.yaml").write_text(with_scheme(scheme))
@@ -163,8 +165,10 @@ def test_resumed_bit_for_bit(whole, tmp_path):
     ("whole", "at"),
     [
         ("monolithic", 1),
-        ("iqn", 3),
-        *(pytest.param(scheme, at, marks=pytest.mark.slow) for scheme, at in (("monolithic", 3), ("aitken", 1))),
+        *(
+            pytest.param(scheme, at, marks=pytest.mark.slow)
+            for scheme, at in (("monolithic", 3), ("iqn", 3), ("aitken", 1))
+        ),
     ],
     indirect=["whole"],
 )
@@ -255,6 +259,7 @@ def test_pictures(monolithic):
     assert len(np.unique(np.round(pixels[300:700, 300:1200].reshape(-1, 3) / 8), axis=0)) > 20
 
 
+@pytest.mark.slow
 def test_no_matrix_is_kept_from_step_to_step(tmp_path, monkeypatch):
     """PETSc counts what it creates and destroys; what Python has dropped it frees only if it is asked to."""
     case, log = tmp_path / "case.yaml", tmp_path / "log.txt"

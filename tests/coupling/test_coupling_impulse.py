@@ -115,6 +115,7 @@ def test_elastic_cylinder_with_any_scheme(tmp_path, scheme, step):
     assert found[4:].mean() == pytest.approx(0.1 / 2.25, rel=0.005)
 
 
+@pytest.mark.slow
 def test_elastic_cylinder_is_resumed(tmp_path):
     """Behind the step that takes the impulse."""
     head, _ = CYLINDER.split("    cylinder:\n")

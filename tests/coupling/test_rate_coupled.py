@@ -91,7 +91,9 @@ def test_the_motion_is_that_of_the_force(tmp_path, bodies, x, element, scheme, l
         assert np.abs(np.array(found[column]) - other[column]).max() < 1e-8 * np.abs(other[column]).max(), column
 
 
-@pytest.mark.parametrize("bodies", [FREE, FLAP], ids=["free", "flap"])
+@pytest.mark.parametrize(
+    "bodies", [pytest.param(FREE, id="free"), pytest.param(FLAP, id="flap", marks=pytest.mark.slow)]
+)
 def test_an_impulsive_start(tmp_path, bodies):
     """The rate is there at once: after the impulse the forces are finite, and both schemes have the same."""
     found = [

@@ -96,6 +96,7 @@ def test_without_contact_it_ends_at_the_wall(tmp_path):
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") != FINISHED
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_the_same(tmp_path):
     short = FALLING.split("verify:")[0].replace("end: 0.5", "end: 0.24")
     whole = run(short, tmp_path / "whole")
@@ -107,6 +108,7 @@ def test_a_resumed_run_is_the_same(tmp_path):
         assert np.array_equal(part[column], whole[column]), column
 
 
+@pytest.mark.slow
 def test_two_discs_in_a_shaft(tmp_path):
     """One falls on the other, which lies on the floor: no overlap, and the floor carries both."""
     more = "    other: {mesh: {shape: disc, radius: 0.12, cells: [20, 1], translate: [0.507, 0.48]}, free: {density: 20, gravity: [0, -10]}}\n"  # noqa: E501

@@ -99,6 +99,7 @@ def test_result_is_that_with_a_tight_layer(tmp_path):
         assert found == pytest.approx((tip, force), rel=0.03), name
 
 
+@pytest.mark.slow
 def test_resumed_run_keeps_contact_closed(tmp_path):
     whole = final(tmp_path, "whole")
     first = write(tmp_path / "parts.yaml", overrides=[("time.end", "0.75")])

@@ -59,6 +59,7 @@ def test_a_sliding_block(sliding):
     assert sliding["iterations"].max() <= 8
 
 
+@pytest.mark.slow
 def test_processes_agree(sliding, tmp_path):
     (tmp_path / "case.yaml").write_text(SLIDING)
     result = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=2)

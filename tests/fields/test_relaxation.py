@@ -214,6 +214,7 @@ probes:
 """
 
 
+@pytest.mark.slow
 def test_resumed_and_distributed_runs(tmp_path):
     """The same bit for bit after half of the run, and to rounding on two processes, which one resumes."""
     (tmp_path / "case.yaml").write_text(CASE)

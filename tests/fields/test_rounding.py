@@ -100,7 +100,7 @@ probes:
     [
         pytest.param(1.0, id="in m", marks=pytest.mark.slow),
         pytest.param(1e6, id="in um"),
-        pytest.param(1e-6, id="in Mm"),
+        pytest.param(1e-6, id="in Mm", marks=pytest.mark.slow),
     ],
 )
 def test_coupled_system_comes_to_rest(tmp_path, meter):
