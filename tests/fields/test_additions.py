@@ -5,6 +5,8 @@ Each is something of its own, not what the library has in other words, and is co
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -14,14 +16,12 @@ import ufl
 from fluid_setup import field, make_fluid, step
 from mpi4py import MPI
 from petsc4py import PETSc
-from programs import ENVIRONMENT, python_here
 from structure_setup import TIGHT
 
 from coupling import contact_surface
 from fsci.builder import structure as build_structure
 from fsci.case import load_case
 from fsci.case.quantities import QUANTITIES
-from fsci.running.copied_process import run_in_copy
 from fsci.running.history import read_history
 from fsci.running.output import FORMATS, FieldWriter
 from fsci.running.run import FINISHED, run_case
@@ -293,7 +293,8 @@ def test_shape(tmp_path):
     (tmp_path / "own.py").write_text(OWN_SHAPE)
 
     def own(*arguments):
-        return run_in_copy(python_here, [str(tmp_path / "own.py"), *map(str, arguments)], ENVIRONMENT, 60.0)
+        command = [sys.executable, tmp_path / "own.py", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
 
     case = tmp_path / "case.yaml"
     case.write_text(IN_A_CASE)
