@@ -156,7 +156,7 @@ def test_tangent_of_the_displacement_element(law):
     assert tangent_error(make_structure(mesh, MATERIALS[law], relaxing=BRANCHES)) < 1e-6
 
 
-@pytest.mark.parametrize("cell_type", ["quad9", "hexahedron"])
+@pytest.mark.parametrize("cell_type", ["quad9", pytest.param("hexahedron", marks=pytest.mark.slow)])
 def test_tangent_of_the_mixed_element(cell_type):
     mesh = distort(block(cell_type, 1), 0.05)
     structure = make_structure(mesh, MATERIALS["mooney_rivlin"], element="mixed", relaxing=BRANCHES)

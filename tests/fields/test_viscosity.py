@@ -55,7 +55,9 @@ def test_undeformed_bodies_have_the_stiffness_of_their_material(material):
     assert times(Viscosity(body).matrix(), v) == pytest.approx(times(K, v), rel=1e-11, abs=1e-10)
 
 
-@pytest.mark.parametrize("cell_type", ["quad", "hexahedron", "quad9", "hexahedron27"])
+@pytest.mark.parametrize(
+    "cell_type", ["quad", "hexahedron", "quad9", pytest.param("hexahedron27", marks=pytest.mark.slow)]
+)
 def test_mixed_elements_do_not_lock(cell_type):
     """The power of smooth velocities that keep the volume is that by the stiffness of the mixed element."""
     body = make_body("block", block(cell_type, 3), NeoHooke(400.0, 6e5, 2.0), element="mixed")
