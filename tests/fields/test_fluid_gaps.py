@@ -115,7 +115,9 @@ def through(gap, place, angle=0.0, length=2.5):
     return flow_rate(fluid)(["out"]) / ((gap * h) ** 3 / (12 * mu) / length)
 
 
-@pytest.mark.parametrize("gap", [1, 0.7, 0.5, 0.25, 0.1, 0.05])
+@pytest.mark.parametrize(
+    "gap", [1, pytest.param(0.7, marks=pytest.mark.slow), 0.5, pytest.param(0.25, marks=pytest.mark.slow), 0.1, 0.05]
+)
 def test_flow_through_a_gap(gap):
     """Within 6 %, 3 % of it at both ends, wherever the gap is in the grid; 0.12 to 1.24 without the term."""
     ratios = np.array([through(gap, place) for place in (0.0, 0.13, 0.31, 0.5, 0.77, 0.95)])
