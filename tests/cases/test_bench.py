@@ -80,6 +80,7 @@ def test_front():
     assert front([(1.0, 5.0), (2.0, 1.0), (3.0, 2.0), (2.0, 1.0), (4.0, 0.5)]) == [True, True, False, True, True]
 
 
+@pytest.mark.slow
 def test_a_family_measures_each_option_and_resolution(tmp_path):
     csm1 = FAMILIES["csm1"]
     rows = only(csm1, resolution=first(csm1, "resolution")).run()

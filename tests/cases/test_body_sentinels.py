@@ -137,15 +137,23 @@ def test_seen_and_silent(faulty, sound, kind, body, tmp_path):
     assert (code, summary["warnings"]) == (0, [])
 
 
-def test_the_same_on_two_processes_and_resumed(tmp_path):
-    """The disc begins to overlap the wall, is stopped there, and goes on."""
-    alone = run(FREE, tmp_path / "alone")[1]
-    assert kinds(alone) == [("wall", "disc")]
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """Summary: the disc begins to overlap the wall, and is stopped there."""
+    return run(FREE, tmp_path_factory.mktemp("alone"))[1]
+
+
+@pytest.mark.slow
+def test_the_same_on_two_processes(tmp_path, alone):
     both = run(FREE, tmp_path / "both", processes=2)[1]
     assert kinds(both) == kinds(alone)
     for one, other in zip(alone["warnings"], both["warnings"], strict=True):
         assert other["time"] == one["time"]
         assert other["value"] == pytest.approx(one["value"], rel=1e-6)
+
+
+def test_the_same_resumed(tmp_path, alone):
+    assert kinds(alone) == [("wall", "disc")]
     at_end = alone["warnings"][0]["time"]
     assert at_end < 0.4
     run(FREE, tmp_path / "part", arguments=["--set", f"time.end={at_end}"])

@@ -90,37 +90,39 @@ SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_ne
 
 #: in space, with forms that no other quick test has; their whole runs are slow tests
 DEAR = ("falling_sphere", "rebound_stokes", "sphere_tube", "torus_rough")
+#: in the plane, with what other cases have, too; their whole runs are slow tests
+DEAR += ("jeffery_orbit", "leaflet_pulsating", "falling_elastic_disc", "hopper")
 OTHERS = [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)]
 
 
 @pytest.mark.parametrize("name", with_slow(OTHERS, lambda name: name in DEAR, {}))
 def test_first_steps(name, tmp_path):
-    three_steps(name, tmp_path)
+    run_steps(name, tmp_path, 3)
 
 
 @pytest.mark.parametrize("name", with_slow(NAMES, lambda name: name not in PARALLEL, {"valve_3d": 170}))
 def test_first_steps_on_two_processes(name, tmp_path):
-    """Probes, forces and balances are those of one process."""
-    assert_same(*(three_steps(name, tmp_path / str(processes), processes) for processes in (1, 2)))
+    """Probes, forces and balances are those of one process, in the first step and in one that has a past."""
+    assert_same(*(run_steps(name, tmp_path / str(processes), 2, processes) for processes in (1, 2)))
 
 
-def three_steps(name, out, processes=1):
-    """History of the first three steps, in which no sentinel finds anything."""
+def run_steps(name, out, steps, processes=1):
+    """History of the first steps, in which no sentinel finds anything."""
     folder = Path("cases") / name
-    done = fsci(*first_steps(folder, out), processes=processes)
+    done = fsci(*first_steps(folder, out, steps), processes=processes)
     assert done.returncode == 0, done.stdout + done.stderr
     assert warnings_of(out) == []
     history, time = read_history(out / "history.csv"), load_case(folder / "case.yaml").time
-    assert len(history["step"]) == min(3, round((time.end - time.start) / time.step))
+    assert len(history["step"]) == min(steps, round((time.end - time.start) / time.step))
     return history
 
 
-def first_steps(folder, out):
-    """Arguments of `fsci` for three steps."""
+def first_steps(folder, out, steps):
+    """Arguments of `fsci` for so many steps."""
     case = load_case(folder / "case.yaml")
     time, residual = case.time, case.solver.newton.residual
     residual = 1e-10 if residual > 1e-8 else residual
-    end = min(time.end, time.start + 3 * time.step)
+    end = min(time.end, time.start + steps * time.step)
     # solved as exactly as they can be, so that what iterations leave over does not tell processes apart
     exact = ["solver.linear.tolerance=1e-12", f"solver.newton.residual={residual!r}"]
     settings = [f"time.end={end!r}", "verify=[]", *exact, *SMALLER.get(folder.name, [])]

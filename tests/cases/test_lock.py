@@ -43,7 +43,7 @@ def wait_for_steps(process, out):
         assert process.poll() is None
 
 
-@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_second_run_is_refused(tmp_path, start, processes):
     """The first one goes on as if nothing had been, and after its end, or its death, another one may write."""
     (tmp_path / "case.yaml").write_text(PLATE)
@@ -64,6 +64,7 @@ def test_a_second_run_is_refused(tmp_path, start, processes):
     assert fsci("resume", out, "--set", "time.step=1e5", processes=processes).returncode == 0
 
 
+@pytest.mark.slow
 def test_on_two_processes_the_first_holds_it(tmp_path, start):
     (tmp_path / "case.yaml").write_text(PLATE)
     out = tmp_path / "out"

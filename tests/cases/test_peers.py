@@ -14,6 +14,7 @@ from fsci.bench import hertz
 from fsci.bench.family import function, read_families
 
 
+@pytest.mark.slow
 def test_our_stokes_flow_has_the_exact_solution():
     coarse, fine = (ours.stokes("q1q1", cells) for cells in (10, 20))
     assert fine["velocity [%]"] < 0.3 * coarse["velocity [%]"] < 0.3

@@ -33,7 +33,9 @@ def out(tmp_path_factory):
     return folder / "out"
 
 
-@pytest.mark.parametrize("title", TITLES[:4])
+@pytest.mark.parametrize(
+    "title", [TITLES[0], TITLES[3], *(pytest.param(title, marks=pytest.mark.slow) for title in TITLES[1:3])]
+)
 def test_pictures_and_pages(out, title, monkeypatch):
     drawn = []
     from matplotlib.text import Text

@@ -38,7 +38,7 @@ def disturbed(what, folder, *, rank=0, processes=1):
     return subprocess.Popen([str(word) for word in command], env=PARALLEL if processes > 1 else ENVIRONMENT, **pipes)
 
 
-@pytest.mark.parametrize(("processes", "rank"), [(2, 0), (3, 1)])
+@pytest.mark.parametrize(("processes", "rank"), [(2, 0), pytest.param(3, 1, marks=pytest.mark.slow)])
 def test_error_of_one_process_ends_all(tmp_path, processes, rank):
     process = disturbed("error", tmp_path, rank=rank, processes=processes)
     output, errors = process.communicate(timeout=60)
@@ -61,7 +61,11 @@ OPEN_MPI_5 = pytest.mark.skipif("Open MPI v5" in MPI.Get_library_version(), reas
 
 @pytest.mark.parametrize(
     ("processes", "number"),
-    [(1, signal.SIGTERM), pytest.param(2, signal.SIGTERM, marks=OPEN_MPI_5), (2, signal.SIGUSR1)],
+    [
+        (1, signal.SIGTERM),
+        pytest.param(2, signal.SIGTERM, marks=OPEN_MPI_5),
+        pytest.param(2, signal.SIGUSR1, marks=pytest.mark.slow),
+    ],
 )
 def test_signal_within_a_solve(tmp_path, processes, number):
     """Within 5 s there is a checkpoint of the last good step; the run goes on from it as if nothing had been."""

@@ -189,7 +189,7 @@ def test_inverted_element_is_named(case, tmp_path, capfd):
 def test_resume_is_bitwise(case, tmp_path):
     """Stopping by a file, then resuming, changes no bit; the history is whole."""
     straight, broken = tmp_path / "straight", tmp_path / "broken"
-    case.write_text(CASE.replace("step: 0.05", "step: 0.004"))  # long enough to be stopped on the way
+    case.write_text(CASE.replace("step: 0.05", "step: 0.008"))  # long enough to be stopped on the way
     assert run_case(load_case(case), straight) == FINISHED
 
     process = start_fsci("run", case, "-o", broken)
@@ -201,7 +201,7 @@ def test_resume_is_bitwise(case, tmp_path):
     assert process.returncode == STOPPED
     summary = json.loads((broken / "summary.json").read_text())
     assert summary["status"] == "stopped"
-    assert summary["steps"]["accepted"] < 250
+    assert summary["steps"]["accepted"] < 125
     assert fsci("resume", broken).returncode == FINISHED
     one, two = final_state(straight), final_state(broken)
     for name in one:

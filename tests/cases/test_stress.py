@@ -244,6 +244,7 @@ def test_a_gate_that_closes_a_basin_turned_around():
     assert (one.scene, one.twin, one.verdict) == ("gate", "rotated by 180 degrees", "right")
 
 
+@pytest.mark.slow
 def test_a_block_that_begins_on_the_floor_and_leaves_it():
     """Fluid comes under it, although its bottom is on the boundary of the box at the start."""
     one = run.judge(73)

@@ -81,6 +81,7 @@ def test_a_flow(tmp_path):
     assert other["values"]["drag.x"]["value"] > 1.05 * drag["value"]
 
 
+@pytest.mark.slow
 def test_what_is_zero_by_symmetry(tmp_path):
     """A difference of pressures above and below, beside a drag: rounding is no change, and no defect of the program."""
     text = FLOW + "  across: {quantity: pressure, at: [0.5, 0.25], minus: [0.5, 0.75]}\n"

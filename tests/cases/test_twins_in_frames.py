@@ -193,8 +193,13 @@ SCENES = {
     "coupled_3d": COUPLED_3D,
 }  # fmt: skip
 
+#: of which a flow with bodies, and contact in space, show as much
+DEAR = ("flow", "coupled_3d")
 
-@pytest.mark.parametrize("scene", SCENES)
+
+@pytest.mark.parametrize(
+    "scene", [pytest.param(name, marks=pytest.mark.slow if name in DEAR else ()) for name in SCENES]
+)
 def test_the_same_in_other_coordinates(scene, tmp_path):
     (tmp_path / "case.yaml").write_text(SCENES[scene])
     ended = fsci("twin", tmp_path, "-o", tmp_path / "out", "--only", "mirrored", "--only", "turned")

@@ -79,7 +79,7 @@ def pairs(text, folder):
     ("scheme", "condition"),
     [
         ("monolithic", "no_slip"),
-        ("partitioned", "slip"),
+        pytest.param("partitioned", "slip", marks=pytest.mark.slow),
         pytest.param("monolithic", "slip", marks=pytest.mark.slow),
         pytest.param("monolithic", "symmetry", marks=pytest.mark.slow),
     ],
@@ -96,7 +96,8 @@ def test_the_floor_carries_the_weight_less_the_force_of_the_fluid(tmp_path, sche
     assert abs(found["contact.block_floor_y_low.x"][-1]) < 1e-9 * WEIGHT
 
 
-@pytest.mark.parametrize("film", [pytest.param("zone: wetted", marks=pytest.mark.slow), "roughness: 0.002"])
+@pytest.mark.slow
+@pytest.mark.parametrize("film", ["zone: wetted", "roughness: 0.002"])
 def test_with_fluid_below_it_the_floor_carries_the_weight_less_the_buoyancy(tmp_path, film):
     """Wetted and seeping contact have the pressure of the fluid below the block, too."""
     deep = changed(BLOCK, ("  viscosity: 0.1", "  viscosity: 0.1\n  gravity: [0, -10]"), ("end: 0.8", "end: 1.2"))
@@ -107,6 +108,7 @@ def test_with_fluid_below_it_the_floor_carries_the_weight_less_the_buoyancy(tmp_
     assert force == pytest.approx(WEIGHT - buoyancy, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_block_in_space(tmp_path):
     found = run(changed(BLOCK, *SPACE.items()), tmp_path)
     weight = 0.4 * WEIGHT
@@ -387,6 +389,7 @@ def test_walls_in_space(tmp_path):
         assert np.count_nonzero(normal) == 1
 
 
+@pytest.mark.slow
 def test_two_processes(tmp_path):
     """The force when the floor has come in, to 1e-10."""
     (tmp_path / "case.yaml").write_text(changed(BLOCK, ("0.333, 0.05", "0.333, 0.02"), ("end: 0.8", "end: 0.16")))

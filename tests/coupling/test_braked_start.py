@@ -38,7 +38,14 @@ def last(folder, step: float, scheme: str, scale: float) -> tuple[float, float]:
     return found["c.y"][-1] / scale, found["v.y"][-1] / scale
 
 
-@pytest.mark.parametrize(("scheme", "scale"), [("monolithic", 1.0), ("monolithic", 1e-3), ("partitioned", 1.0)])
+@pytest.mark.parametrize(
+    ("scheme", "scale"),
+    [
+        ("monolithic", 1.0),
+        pytest.param("monolithic", 1e-3, marks=pytest.mark.slow),
+        pytest.param("partitioned", 1.0, marks=pytest.mark.slow),
+    ],
+)
 def test_the_first_step_resolves_how_the_flow_brakes_the_body(tmp_path, scheme, scale):
     place, velocity = last(tmp_path / "short", 0.025, "monolithic", 1.0)
     found = last(tmp_path / "long", 0.5, scheme, scale)

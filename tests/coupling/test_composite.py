@@ -102,6 +102,7 @@ def test_each_moves_as_it_does_alone(scheme, tmp_path, whole):
     assert both["interface.force"][1:].max() < 1e-9  # the first force belongs to the start steps
 
 
+@pytest.mark.slow
 def test_both_schemes_agree(tmp_path):
     """Without the wall they feel each other: the same by both schemes."""
     open_scene = lambda scheme: re.sub("    wall:.*\n", "", scene(scheme))  # noqa: E731

@@ -197,7 +197,9 @@ def test_thrown_wall(tmp_path):
     assert history["volume"] == pytest.approx(history["volume"][0], rel=1e-6)
 
 
-@pytest.mark.parametrize(("parts", "ball"), [(FLAT, np.pi * 0.37**2), (SOLID, 4 / 3 * np.pi * 0.37**3)])
+@pytest.mark.parametrize(
+    ("parts", "ball"), [(FLAT, np.pi * 0.37**2), pytest.param(SOLID, 4 / 3 * np.pi * 0.37**3, marks=pytest.mark.slow)]
+)
 def test_closed_wall(parts, ball, tmp_path):
     """The fluid is what is inside, and it keeps its volume up to second order in the motion."""
     history = run(balloon(parts), tmp_path)

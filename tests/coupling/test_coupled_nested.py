@@ -127,7 +127,11 @@ def test_cells_follow_a_free_body(sinking, tmp_path):
 
 @pytest.mark.parametrize(
     ("processes", "end"),
-    [(2, 0.28), pytest.param(2, 0.46, marks=pytest.mark.slow), pytest.param(3, 0.28, marks=pytest.mark.slow)],
+    [
+        pytest.param(2, 0.28, marks=pytest.mark.slow),
+        pytest.param(2, 0.46, marks=pytest.mark.slow),
+        pytest.param(3, 0.28, marks=pytest.mark.slow),
+    ],
 )
 def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
     """While it sinks by more than one large cell."""
@@ -141,9 +145,8 @@ def test_cells_follow_on_several_processes(sinking, tmp_path, processes, end):
         assert differ(one, several, name) < 1e-8, name
 
 
-@pytest.mark.parametrize(
-    "text", [pytest.param(NESTED, id="post"), pytest.param(BALL, id="ball", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [pytest.param(NESTED, id="post"), pytest.param(BALL, id="ball")])
 def test_two_processes(text, tmp_path, nested):
     one = nested[1] if text is NESTED else run(text, tmp_path)
     (tmp_path / "case.yaml").write_text(text)
@@ -155,7 +158,8 @@ def test_two_processes(text, tmp_path, nested):
 
 
 @pytest.mark.parametrize(
-    ("text", "whole", "middle", "end"), [(NESTED, "nested", "0.06", "0.1"), (SINKING, "sinking", "0.28", "0.46")]
+    ("text", "whole", "middle", "end"),
+    [pytest.param(NESTED, "nested", "0.06", "0.1", marks=pytest.mark.slow), (SINKING, "sinking", "0.28", "0.46")],
 )
 def test_resumed_bit_for_bit(text, whole, middle, end, tmp_path, request):
     _, uninterrupted = request.getfixturevalue(whole)

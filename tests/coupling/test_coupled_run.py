@@ -119,6 +119,9 @@ def test_all_schemes_agree(whole, monolithic):
     assert np.abs(history["force.x"] - expected["force.x"]).max() < 1e-5 * np.abs(expected["force.x"]).max()
 
 
+@pytest.mark.parametrize(
+    "whole", ["monolithic", *(pytest.param(name, marks=pytest.mark.slow) for name in ("iqn", "aitken"))], indirect=True
+)
 def test_directions_that_span_the_plane_hold_all(whole, tmp_path):
     """A foot held along two directions that are no axes is the clamped one, whatever couples fluid and structure."""
     scheme, _, expected = whole
@@ -141,6 +144,9 @@ def test_balances_are_in_the_history(whole):
     assert np.abs(history["fluid.mass"]).max() < 1e-9
 
 
+@pytest.mark.parametrize(
+    "whole", ["monolithic", *(pytest.param(name, marks=pytest.mark.slow) for name in ("iqn", "aitken"))], indirect=True
+)
 def test_resumed_bit_for_bit(whole, tmp_path):
     scheme, _, expected = whole
     (tmp_path / "case.yaml").write_text(with_scheme(scheme))
@@ -159,8 +165,10 @@ def test_resumed_bit_for_bit(whole, tmp_path):
     ("whole", "at"),
     [
         ("monolithic", 1),
-        ("iqn", 3),
-        *(pytest.param(scheme, at, marks=pytest.mark.slow) for scheme, at in (("monolithic", 3), ("aitken", 1))),
+        *(
+            pytest.param(scheme, at, marks=pytest.mark.slow)
+            for scheme, at in (("monolithic", 3), ("iqn", 3), ("aitken", 1))
+        ),
     ],
     indirect=["whole"],
 )
@@ -203,11 +211,11 @@ def test_a_case_that_fails_at_once_says_so_and_keeps_a_checkpoint(tmp_path):
 @pytest.mark.parametrize(
     ("text", "scheme"),
     [
-        pytest.param(POST, "monolithic", id="post-monolithic"),
+        pytest.param(POST, "monolithic", id="post-monolithic", marks=pytest.mark.slow),
         pytest.param(POST, "iqn", id="post-iqn", marks=pytest.mark.slow),
         pytest.param(BLOCK, "monolithic", id="block-monolithic", marks=pytest.mark.slow),
         pytest.param(BLOCK, "iqn", id="block-iqn", marks=pytest.mark.slow),
-        pytest.param(MEETING, "monolithic", id="contact-monolithic"),
+        pytest.param(MEETING, "monolithic", id="contact-monolithic", marks=pytest.mark.slow),
         pytest.param(MEETING, "iqn", id="contact-iqn", marks=pytest.mark.slow),
     ],
 )
@@ -251,6 +259,7 @@ def test_pictures(monolithic):
     assert len(np.unique(np.round(pixels[300:700, 300:1200].reshape(-1, 3) / 8), axis=0)) > 20
 
 
+@pytest.mark.slow
 def test_no_matrix_is_kept_from_step_to_step(tmp_path, monkeypatch):
     """PETSc counts what it creates and destroys; what Python has dropped it frees only if it is asked to."""
     case, log = tmp_path / "case.yaml", tmp_path / "log.txt"

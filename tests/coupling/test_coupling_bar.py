@@ -33,7 +33,9 @@ def zeros(values: np.ndarray, dt: float) -> np.ndarray:
     return t[change] - values[change] * dt / (values[change + 1] - values[change])
 
 
-@pytest.mark.parametrize("ratio", [10.0, pytest.param(1.0, marks=pytest.mark.slow), 0.1])
+@pytest.mark.parametrize(
+    "ratio", [pytest.param(10.0, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.slow), 0.1]
+)
 def test_frequency(ratio: float):
     omega = BAR_MODES[ratio]
     dt = 2.0 * np.pi / omega / 60.0

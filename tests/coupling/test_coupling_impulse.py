@@ -67,10 +67,10 @@ def speeds(folder, text, name="v.x"):
     ("scheme", "coupling", "step", "steps"),
     [
         ("bdf2", "monolithic", 0.02, 12),
-        ("bdf2", "monolithic", 0.002, 16),
+        pytest.param("bdf2", "monolithic", 0.002, 16, marks=pytest.mark.slow),
         ("bdf2", "partitioned", 0.02, 4),
-        ("bdf2_optimized", "monolithic", 0.02, 8),
-        ("backward_euler", "monolithic", 0.02, 8),
+        pytest.param("bdf2_optimized", "monolithic", 0.02, 8, marks=pytest.mark.slow),
+        pytest.param("backward_euler", "monolithic", 0.02, 8, marks=pytest.mark.slow),
     ],
 )
 def test_cylinder_in_a_round_tank(tmp_path, scheme, coupling, step, steps):
@@ -115,6 +115,7 @@ def test_elastic_cylinder_with_any_scheme(tmp_path, scheme, step):
     assert found[4:].mean() == pytest.approx(0.1 / 2.25, rel=0.005)
 
 
+@pytest.mark.slow
 def test_elastic_cylinder_is_resumed(tmp_path):
     """Behind the step that takes the impulse."""
     head, _ = CYLINDER.split("    cylinder:\n")
@@ -126,7 +127,8 @@ def test_elastic_cylinder_is_resumed(tmp_path):
     assert (read_history(tmp_path / "parts" / "run" / "history.csv")["p.x"] == whole).all()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["bdf2", "bdf2_optimized", "backward_euler"])
 def test_steps_that_change_while_it_coasts(tmp_path, scheme):
     """By a factor of 1/50, as after many retries."""
     text = CYLINDER.format(step=0.02, end=0.1, scheme=scheme, coupling="monolithic", x=0.0)
@@ -235,6 +237,7 @@ output: {{fields_every: 0}}
 """
 
 
+@pytest.mark.slow
 def test_ball_in_space(tmp_path):
     """The velocity that stays belongs to the impulse on a ball whose motion is given and starts with a jump.
 

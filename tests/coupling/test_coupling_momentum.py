@@ -39,7 +39,9 @@ solver: {newton: {residual: 1.0e-11}}
 """
 
 
-@pytest.mark.parametrize("scheme", ["monolithic", "partitioned, tolerance: 1.0e-10"])
+@pytest.mark.parametrize(
+    "scheme", ["monolithic", pytest.param("partitioned, tolerance: 1.0e-10", marks=pytest.mark.slow)]
+)
 def test_the_ball_gets_what_the_fluid_loses(scheme, tmp_path):
     """Its momentum changes by dt times the mean of the forces before and after a step (rho_inf = 1), and the force is
     what inertia, walls and outlet of the fluid leave over. Both to what the solvers leave: 1e-11 of the force.

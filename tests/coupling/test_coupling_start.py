@@ -54,7 +54,9 @@ def rates(folder, *, step=0.02, steps=6, scheme="monolithic", solid=ELASTIC, top
     return np.diff(read_history(folder / "run" / "history.csv")["momentum.y"], prepend=0.0) / step
 
 
-@pytest.mark.parametrize("step", [0.02, pytest.param(0.01, marks=pytest.mark.slow), 0.005])
+@pytest.mark.parametrize(
+    "step", [0.02, pytest.param(0.01, marks=pytest.mark.slow), pytest.param(0.005, marks=pytest.mark.slow)]
+)
 def test_a_disc_in_fluid_of_its_density_starts_smoothly(step, tmp_path):
     """The rate is within 1 % of a straight line from the first step on; the disc alone would begin with -0.78."""
     found = rates(tmp_path, step=step)
@@ -152,7 +154,7 @@ def test_first_steps_that_move_a_body_by_a_cell_are_divided(cells_moved, first):
     assert coupled.flow.history.steps == pytest.approx((first, first))
 
 
-@pytest.mark.parametrize("solid", [ELASTIC, RIGID])
+@pytest.mark.parametrize("solid", [pytest.param(ELASTIC, marks=pytest.mark.slow), RIGID])
 def test_the_length_of_the_first_step_does_not_matter(solid, tmp_path):
     """A disc falls for 0.4 s, in one step, which is divided (6 h^2 a is ten cells), or in eight."""
     momentum = []

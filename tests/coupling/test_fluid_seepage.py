@@ -130,6 +130,7 @@ def test_elastic_cylinder_settles_until_contact(text, tmp_path):
     assert history["iterations"][1:].max() <= 5
 
 
+@pytest.mark.slow
 def test_two_processes(tmp_path):
     """Two steps with slip and seepage, of which one process has no surface at first."""
     text = MEETING.replace("contact:\n", "contact:\n  film: {roughness: 0.02}\n", 1)

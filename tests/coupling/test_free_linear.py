@@ -68,7 +68,10 @@ def test_iterations_of_free_bodies(tmp_path, free):
     assert per_system <= 1.5 * sum(given["fluid.linear"]) / sum(given["iterations"])
 
 
-@pytest.mark.parametrize(("method", "processes"), [("direct", 1), ("iterative", 2)])
+@pytest.mark.parametrize(
+    ("method", "processes"),
+    [pytest.param("direct", 1, marks=pytest.mark.slow), pytest.param("iterative", 2, marks=pytest.mark.slow)],
+)
 def test_motions_do_not_depend_on_the_linear_solver(tmp_path, free, method, processes):
     other = run(tmp_path / "other", FREE, method, processes)
     for name in ("light", "heavy"):

@@ -103,6 +103,7 @@ def test_a_rigid_disc_is_a_stiff_one(settled, tmp_path):
     assert 0.351 - found["centre.y"][-1] == pytest.approx(sunk, rel=0.01)
 
 
+@pytest.mark.slow
 def test_both_schemes_agree(tmp_path):
     one = run(PUSHED, tmp_path / "one")
     two = run(PUSHED.replace("scheme: monolithic", "scheme: partitioned, tolerance: 1.0e-9"), tmp_path / "two")
@@ -110,6 +111,7 @@ def test_both_schemes_agree(tmp_path):
         np.testing.assert_allclose(two[column], one[column], rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_the_same(tmp_path):
     whole = run(PUSHED, tmp_path / "whole")
     run(PUSHED.replace("end: 0.2", "end: 0.1"), tmp_path / "part")
@@ -119,6 +121,7 @@ def test_a_resumed_run_is_the_same(tmp_path):
         assert np.array_equal(part[column], whole[column]), column
 
 
+@pytest.mark.slow
 def test_two_processes(tmp_path):
     one = run(PUSHED, tmp_path / "one")
     path = tmp_path / "two.yaml"

@@ -36,7 +36,7 @@ def test_film_of_a_twentieth_of_a_cell(h, ratio):
     assert drag_ratio(2, 0.05 * h, h, "q2q1") == pytest.approx(ratio, abs=0.01)
 
 
-@pytest.mark.parametrize(("h", "dt"), [(0.1, 0.1), (0.05, 0.3)])
+@pytest.mark.parametrize(("h", "dt"), [pytest.param(0.1, 0.1, marks=pytest.mark.slow), (0.05, 0.3)])
 def test_cylinder_that_closes_a_gap(h, dt):
     """A moving body, from a gap of a cell to a tenth of one: within 1.5 % in every step."""
     ratios = np.array(closing_ratios(h, round(2.4 / dt), dt))

@@ -52,6 +52,7 @@ def test_partitioned_is_monolithic(on_outlet, tmp_path):
         assert np.abs(found[name] - expected[name]).max() < 1e-6 * np.abs(expected[name]).max()
 
 
+@pytest.mark.slow
 def test_resumed_bit_for_bit(on_outlet, tmp_path):
     expected, folder = on_outlet[1], tmp_path / "part"
     run(ON_OUTLET, folder, ("time.end", "0.04"))

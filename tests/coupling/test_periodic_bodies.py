@@ -60,7 +60,11 @@ def motion(folder, steps=5, **choices):
 @pytest.mark.parametrize("bodies", [FREE, ELASTIC], ids=["free", "elastic"])
 @pytest.mark.parametrize(
     ("element", "scheme"),
-    [("q1q1", "monolithic"), ("q2q1", "monolithic"), pytest.param("q2q1", "partitioned", marks=pytest.mark.slow)],
+    [
+        ("q1q1", "monolithic"),
+        pytest.param("q2q1", "monolithic", marks=pytest.mark.slow),
+        pytest.param("q2q1", "partitioned", marks=pytest.mark.slow),
+    ],
 )
 def test_it_moves_as_within_the_period(tmp_path, bodies, element, scheme):
     """By whole cells further, across the end, and in another period."""
@@ -72,7 +76,9 @@ def test_it_moves_as_within_the_period(tmp_path, bodies, element, scheme):
         assert np.abs(felt - force).max() < 1e-8 * np.abs(force).max()
 
 
-@pytest.mark.parametrize("bodies", [FREE, ELASTIC], ids=["free", "elastic"])
+@pytest.mark.parametrize(
+    "bodies", [pytest.param(FREE, id="free"), pytest.param(ELASTIC, id="elastic", marks=pytest.mark.slow)]
+)
 def test_it_resumes_across_the_end(tmp_path, bodies):
     """To the last digit; and two processes have the same to 1e-8."""
     probe = "probes: {force: {quantity: force, body: disc}, energy: {quantity: kinetic_energy}}\n"

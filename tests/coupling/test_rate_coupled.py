@@ -64,11 +64,21 @@ def run(folder, *args, **choices):
     return read_history(folder / "out" / "history.csv")
 
 
-@pytest.mark.parametrize(("bodies", "x"), [(FREE, 0.9), (FREE, 1.9), (FLAP, 0.9)], ids=["free", "crosses", "flap"])
-@pytest.mark.parametrize(("element", "scheme", "linear"), [
+BODIES = {"free": (FREE, 0.9), "crosses": (FREE, 1.9), "flap": (FLAP, 0.9)}
+WAYS = [
     ("q1q1", "monolithic", "direct"), ("q2q1", "monolithic", "direct"), ("q1q1", "partitioned", "direct"),
     ("q1q1", "monolithic", "iterative"),
-])  # fmt: skip
+]  # fmt: skip
+#: each body and each way once; all pairs of them are slow
+QUICK = dict(zip(WAYS, ("flap", "free", "free", "crosses"), strict=True))
+PAIRS = [
+    pytest.param(*BODIES[name], *way, id="-".join((*way, name)), marks=() if QUICK[way] == name else pytest.mark.slow)
+    for way in WAYS
+    for name in BODIES
+]
+
+
+@pytest.mark.parametrize(("bodies", "x", "element", "scheme", "linear"), PAIRS)
 def test_the_motion_is_that_of_the_force(tmp_path, bodies, x, element, scheme, linear):
     """Run with a rate, read G, run with the body force G, in as many iterations. It is zero at the start."""
     choices = {"x": x, "element": element, "scheme": scheme, "linear": linear}
@@ -81,7 +91,9 @@ def test_the_motion_is_that_of_the_force(tmp_path, bodies, x, element, scheme, l
         assert np.abs(np.array(found[column]) - other[column]).max() < 1e-8 * np.abs(other[column]).max(), column
 
 
-@pytest.mark.parametrize("bodies", [FREE, FLAP], ids=["free", "flap"])
+@pytest.mark.parametrize(
+    "bodies", [pytest.param(FREE, id="free"), pytest.param(FLAP, id="flap", marks=pytest.mark.slow)]
+)
 def test_an_impulsive_start(tmp_path, bodies):
     """The rate is there at once: after the impulse the forces are finite, and both schemes have the same."""
     found = [

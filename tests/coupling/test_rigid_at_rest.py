@@ -52,13 +52,25 @@ BARS = (
     ("text", "up", "flows"),  # flows: what the dying flow still changes of the buoyancy
     [
         pytest.param(DISC, "y", 1e-6, id="disc"),
-        pytest.param(DISC.replace("[0.528,", "[0.556,"), "y", 1e-6, id="moved by a third of a cell"),
-        pytest.param(DISC.replace("scheme: monolithic", "scheme: partitioned"), "y", 1e-6, id="partitioned"),
         pytest.param(
-            DISC.replace("viscosity: 0.5\n  element: q1q1", "viscosity: 0.02\n  element: q2q1"), "y", 2e-3, id="q2q1"
+            DISC.replace("[0.528,", "[0.556,"), "y", 1e-6, id="moved by a third of a cell", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            DISC.replace("scheme: monolithic", "scheme: partitioned"),
+            "y",
+            1e-6,
+            id="partitioned",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            DISC.replace("viscosity: 0.5\n  element: q1q1", "viscosity: 0.02\n  element: q2q1"),
+            "y",
+            2e-3,
+            id="q2q1",
+            marks=pytest.mark.slow,
         ),
         pytest.param(BALL, "z", 1e-6, id="ball"),
-        pytest.param(BARS, "z", 1e-6, id="bars that cross"),
+        pytest.param(BARS, "z", 1e-6, id="bars that cross", marks=pytest.mark.slow),
     ],
 )
 def test_contact_carries_what_the_fluid_does_not(tmp_path, text, up, flows):

@@ -121,7 +121,7 @@ def test_blocks_against_finite_differences(monkeypatch):
         assert error < 1e-6
 
 
-@pytest.mark.parametrize("name", list(SCHEMES))
+@pytest.mark.parametrize("name", ["monolithic", pytest.param("partitioned", marks=pytest.mark.slow)])
 def test_the_frequency_on_a_spring_has_the_added_mass(name):
     """A disc in a round tank, hardly any viscosity: m_a = rho pi a^2 (b^2 + a^2) / (b^2 - a^2).
 

@@ -73,7 +73,9 @@ output: {fields_every: 0}
 """  # noqa: E501
 
 
-@pytest.mark.parametrize(("friction", "held"), [(0.5, False), (0.25, True), (0.1, True)])
+@pytest.mark.parametrize(
+    ("friction", "held"), [(0.5, False), (0.25, True), pytest.param(0.1, True, marks=pytest.mark.slow)]
+)
 def test_friction_with_the_floor_in_a_flow(tmp_path, friction, held):
     """A disc rolls as without a fluid. One that does not turn rests below the angle of friction, or slides."""
     texts = [
@@ -94,6 +96,7 @@ def test_without_contact_it_ends_at_the_wall(tmp_path):
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") != FINISHED
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_the_same(tmp_path):
     short = FALLING.split("verify:")[0].replace("end: 0.5", "end: 0.24")
     whole = run(short, tmp_path / "whole")
@@ -105,6 +108,7 @@ def test_a_resumed_run_is_the_same(tmp_path):
         assert np.array_equal(part[column], whole[column]), column
 
 
+@pytest.mark.slow
 def test_two_discs_in_a_shaft(tmp_path):
     """One falls on the other, which lies on the floor: no overlap, and the floor carries both."""
     more = "    other: {mesh: {shape: disc, radius: 0.12, cells: [20, 1], translate: [0.507, 0.48]}, free: {density: 20, gravity: [0, -10]}}\n"  # noqa: E501

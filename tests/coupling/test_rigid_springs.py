@@ -209,7 +209,7 @@ output: {fields_every: 0}
 IN_WATER = 2.0 * 10.0 * 16 * 0.5 * 0.12**2 * np.sin(2.0 * np.pi / 16)  # (3 - 1) g V
 
 
-@pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
+@pytest.mark.parametrize("scheme", ["monolithic", pytest.param("partitioned", marks=pytest.mark.slow)])
 def test_a_disc_in_a_fluid_hangs_on_a_plate(tmp_path, scheme):
     """The spring carries its weight less the buoyancy; on the way the interface keeps its momentum."""
     found = simulation(SINKING.replace("scheme: monolithic", f"scheme: {scheme}"), tmp_path)
@@ -234,13 +234,22 @@ def histories(folder, *, processes=1, cut=None):
     return read_history(folder / "out" / "history.csv")
 
 
-def test_resumed_bit_for_bit_and_on_two_processes(tmp_path):
-    one = histories(tmp_path / "one")
-    assert one["disc.y"][-1] < 0.47 - 1e-3
-    resumed, two = histories(tmp_path / "resumed", cut=0.06), histories(tmp_path / "two", processes=2)
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    return histories(tmp_path_factory.mktemp("moving") / "one")
+
+
+def test_resumed_bit_for_bit(tmp_path, moving):
+    assert moving["disc.y"][-1] < 0.47 - 1e-3
+    resumed = histories(tmp_path / "resumed", cut=0.06)
     for name in ("disc.x", "disc.y", "interface.force", "structure.energy"):
-        assert np.array_equal(one[name], resumed[name]), name
-    assert two["disc.y"] == pytest.approx(one["disc.y"], rel=1e-10)
+        assert np.array_equal(moving[name], resumed[name]), name
+
+
+@pytest.mark.slow
+def test_two_processes(tmp_path, moving):
+    two = histories(tmp_path / "two", processes=2)
+    assert two["disc.y"] == pytest.approx(moving["disc.y"], rel=1e-10)
 
 
 MISTAKES = [

@@ -62,7 +62,7 @@ def pair(x):
     return discs(*((a + x, y) for a, y in PLACES), speeds=(1, -1))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", ["monolithic", pytest.param("partitioned", marks=pytest.mark.slow)])
 def test_two_free_discs(tmp_path, scheme):
     """Across the end, and each in another period."""
     known = motion(tmp_path, pair(0.0), scheme=scheme)
@@ -73,6 +73,7 @@ def test_two_free_discs(tmp_path, scheme):
     same(motion(tmp_path, far, scheme=scheme), known)
 
 
+@pytest.mark.slow
 def test_one_period_is_as_two_of_them(tmp_path):
     """With two pairs that both meet, one of them across the end."""
     one, columns = motion(tmp_path, pair(1.0))
@@ -143,7 +144,13 @@ def repeats(monkeypatch, length):
 
 
 @pytest.mark.parametrize(
-    ("free", "stiffness"), [(False, (400, 400)), (False, (400, 4000)), (False, (4000, 400)), (True, (0, 400))]
+    ("free", "stiffness"),
+    [
+        (False, (400, 400)),
+        pytest.param(False, (400, 4000), marks=pytest.mark.slow),
+        pytest.param(False, (4000, 400), marks=pytest.mark.slow),
+        (True, (0, 400)),
+    ],
 )
 def test_dry_discs(tmp_path, monkeypatch, free, stiffness):
     """Elastic slaves and masters with friction, and a free rigid master: the pair in one place, and periods apart."""

@@ -41,6 +41,7 @@ def test_exponent_one_is_newtonian(thinning, tmp_path):
     assert abs(thinning["force.x"][-1]) < 0.98 * abs(known["force.x"][-1])
 
 
+@pytest.mark.slow
 def test_resumed_with_it(thinning, tmp_path):
     run(THINNING, tmp_path, ("time.end", "0.04"))
     ended = fsci("resume", tmp_path / "out", "--set", "time.end=0.1")

@@ -49,7 +49,15 @@ def squeezed(folder, inner, end, x=0.0):
     return history, history["fluid.pocket_1"] / (16 * inner**2 * np.sin(np.pi / 16))
 
 
-@pytest.mark.parametrize(("inner", "x"), [(0.045, 0.0), (0.045, 0.0185), (0.12, 0.0), (0.24, 0.0)])
+@pytest.mark.parametrize(
+    ("inner", "x"),
+    [
+        pytest.param(0.045, 0.0, marks=pytest.mark.slow),
+        (0.045, 0.0185),
+        (0.12, 0.0),
+        pytest.param(0.24, 0.0, marks=pytest.mark.slow),
+    ],
+)
 def test_walls_of_any_thickness_are_tight(tmp_path, inner, x):
     """5, 3.6 and 1.4 cells; before contact. With shared unknowns the middle one loses 0.3 %.
 

@@ -64,14 +64,24 @@ def final(folder, name, **settings) -> tuple[float, float]:
     return found["tip.x"][-1] / size, found["contact.stop.x"][-1] / size
 
 
-@pytest.mark.parametrize("settings", [{"speed": 0.85}, {"speed": 1.1}, {"shift": 0.0278}, {"scheme": "partitioned"}])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"speed": 0.85},
+        pytest.param({"speed": 1.1}, marks=pytest.mark.slow),
+        pytest.param({"shift": 0.0278}, marks=pytest.mark.slow),
+        {"scheme": "partitioned"},
+    ],
+)
 def test_steady_contact_converges(tmp_path, settings):
     tip, force = final(tmp_path, "run", **settings)
     assert 0.08 < tip < 0.09
     assert force < -3.0
 
 
-@pytest.mark.parametrize("factor", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize(
+    "factor", [pytest.param(0.2, marks=pytest.mark.slow), 0.5, pytest.param(0.8, marks=pytest.mark.slow)]
+)
 def test_a_load_that_is_too_large_comes_in_halves(tmp_path, factor, monkeypatch):
     """Whatever c_n is: with all of the load at once elements are inverted in the second step."""
     monkeypatch.setattr("solvers.structure.tangent.of_surfaces", lambda matrix, body: factor)
@@ -80,6 +90,7 @@ def test_a_load_that_is_too_large_comes_in_halves(tmp_path, factor, monkeypatch)
     assert force < -3.0
 
 
+@pytest.mark.slow
 def test_result_is_that_with_a_tight_layer(tmp_path):
     """A layer of 1e-4 closes all slits by itself. Half the step and a thousandth of the size change nothing."""
     tip, force = final(tmp_path, "sealed", film="  film: {seal: 1.0e-4}\n")
@@ -88,6 +99,7 @@ def test_result_is_that_with_a_tight_layer(tmp_path):
         assert found == pytest.approx((tip, force), rel=0.03), name
 
 
+@pytest.mark.slow
 def test_resumed_run_keeps_contact_closed(tmp_path):
     whole = final(tmp_path, "whole")
     first = write(tmp_path / "parts.yaml", overrides=[("time.end", "0.75")])

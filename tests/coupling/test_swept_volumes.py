@@ -81,7 +81,7 @@ def history(folder, text):
     ("scheme", "coupling"),
     [
         ("backward_euler", "monolithic"),
-        ("bdf2", "monolithic"),
+        pytest.param("bdf2", "monolithic", marks=pytest.mark.slow),
         pytest.param("bdf2_optimized", "monolithic", marks=pytest.mark.slow),
         pytest.param("backward_euler", "partitioned", marks=pytest.mark.slow),
     ],
@@ -95,7 +95,7 @@ def test_ring_keeps_its_water(tmp_path, scheme, coupling):
     assert np.abs(found["fluid.mass"]).max() < (1e-9 if coupling == "monolithic" else 1e-5)
 
 
-@pytest.mark.parametrize("scheme", ["backward_euler", "bdf2"])
+@pytest.mark.parametrize("scheme", [pytest.param("backward_euler", marks=pytest.mark.slow), "bdf2"])
 def test_roll_turned_by_its_hub_pumps_nothing(tmp_path, scheme):
     """The velocities of vertices alone pump pi R^2 omega^2 dt = 0.05 m^2/s with backward Euler."""
     text = ROLL.format(scheme=scheme).replace("th)", "3*ramp(t, 0, 0.1)*t)")

@@ -45,8 +45,8 @@ def run(folder, **settings):
     ("scheme", "coupling", "step", "x", "viscosity"),
     [
         ("bdf2", "monolithic", 0.5, 0.0, 1.0),
-        ("bdf2_optimized", "monolithic", 0.25, 1 / 30, 1.0),
-        ("backward_euler", "monolithic", 0.5, 0.0, 1e3),
+        pytest.param("bdf2_optimized", "monolithic", 0.25, 1 / 30, 1.0, marks=pytest.mark.slow),
+        pytest.param("backward_euler", "monolithic", 0.5, 0.0, 1e3, marks=pytest.mark.slow),
         pytest.param("bdf2", "partitioned", 0.5, 1 / 30, 1.0, marks=pytest.mark.slow),
     ],
 )

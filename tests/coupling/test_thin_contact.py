@@ -66,6 +66,7 @@ def test_flap_that_closes_a_channel(tmp_path):
     assert history["lower.x"][-1] + history["upper.x"][-1] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_flap_that_stays_apart(tmp_path):
     """By 0.05 cells: the pressure decreases in the film between them."""
     history = history_of(tmp_path, E=8e5, end=1.5)

@@ -36,7 +36,7 @@ probes:
 """
 
 
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
 def test_wall_that_closes_a_channel(tmp_path, element):
     """In the end it rests: pressures 1 and 0 beside it, and the deflection of the wall alone (`test_thin_elastic`)."""
     (tmp_path / "case.yaml").write_text(WALL.format(element=element))

@@ -120,7 +120,7 @@ def run(folder, text):
 @pytest.mark.parametrize(
     ("pair", "cells", "scheme", "x"),
     [
-        (f"slave: {HIGH}, master: {LOW}", 5, "monolithic", 0.81),
+        pytest.param(f"slave: {HIGH}, master: {LOW}", 5, "monolithic", 0.81, marks=pytest.mark.slow),
         pytest.param(f"slave: {LOW}, master: {HIGH}", 5, "monolithic", 0.81 + 0.05 / 3, marks=pytest.mark.slow),
         pytest.param(f"slave: {HIGH}, master: {LOW}", 4, "partitioned", 0.81, marks=pytest.mark.slow),
     ],
@@ -135,7 +135,9 @@ def test_halves_with_other_cells_move_as_those_with_the_same(tmp_path, pair, cel
     assert np.abs(found["fluid.mass"]).max() < 1e-10
 
 
-@pytest.mark.parametrize(("scene", "axis", "area"), [(PLANE, "y", 0.31), (SPACE, "z", 0.31 * 0.33)])
+@pytest.mark.parametrize(
+    ("scene", "axis", "area"), [(PLANE, "y", 0.31), pytest.param(SPACE, "z", 0.31 * 0.33, marks=pytest.mark.slow)]
+)
 def test_a_block_on_a_wider_one_hides_its_own_area(tmp_path, scene, axis, area):
     """Both have the pressure 7 Pa on all of their surface but the tie: the same force, up and down."""
     found = run(tmp_path / "tee", BLOCKS.format(**scene))

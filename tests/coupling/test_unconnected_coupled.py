@@ -10,7 +10,7 @@ AGREE = 1e-9
 
 
 @pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
-@pytest.mark.parametrize("seed", [*range(2), *(pytest.param(n, marks=pytest.mark.slow) for n in range(2, 40))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 40))])
 def test_a_scene_beside_a_flow(tmp_path, scheme, seed):
     """In steady and unsteady flow; supports that move the other scene, its accelerations and its way do not count."""
     rng = np.random.default_rng(seed)

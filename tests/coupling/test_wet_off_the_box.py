@@ -50,7 +50,11 @@ def history(folder, **settings):
 
 @pytest.mark.parametrize(
     ("scheme", "element"),
-    [("monolithic", "q1q1"), ("partitioned", "q1q1"), pytest.param("monolithic", "q2q1", marks=pytest.mark.slow)],
+    [
+        ("monolithic", "q1q1"),
+        pytest.param("partitioned", "q1q1", marks=pytest.mark.slow),
+        pytest.param("monolithic", "q2q1", marks=pytest.mark.slow),
+    ],
 )
 def test_a_plug_leaves_its_wall(tmp_path, scheme, element):
     """It swallows nothing: half of the flow vanished in its upper side. All of its surface is wet, as if named so."""

@@ -58,6 +58,7 @@ def test_free_bar_shortens(tmp_path, angle):
     assert found["energy.work"][-1] == pytest.approx(found["energy.internal"][-1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_held_bar_pulls_on_two_processes(tmp_path):
     """With T on its support, which is also the traction there; to rounding on two processes."""
     one = bar(tmp_path / "one", held=True)

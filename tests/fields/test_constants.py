@@ -53,7 +53,7 @@ def test_angle_of_sharp_edges(monkeypatch, angle):
     assert all(np.array_equal(a, b) for a, b in zip(*found, strict=True))
 
 
-@pytest.mark.parametrize("opposed", [-0.35, -0.65])
+@pytest.mark.parametrize("opposed", [-0.35, pytest.param(-0.65, marks=pytest.mark.slow)])
 def test_facets_that_face_each_other(monkeypatch, tmp_path, opposed):
     """A ring that claps together with all its corners: the same motion."""
     text = CLAPPING.replace("on: [start, end]", "on: [inner, outer, start, end]")
@@ -265,6 +265,7 @@ def test_constants_of_gaps(in_gaps, monkeypatch, module, name, value, same):
     assert drags_in_gaps() == pytest.approx(in_gaps, rel=same)
 
 
+@pytest.mark.slow
 def test_largest_amplification_of_an_extension(monkeypatch):
     """2D-1 is the same over three decades; with lines everywhere (1) its pressure difference is worse."""
 

@@ -67,7 +67,7 @@ def run(bodies, law, dt, end=0.3):
 @pytest.mark.parametrize(
     ("velocity", "spin", "law"),
     [
-        pytest.param(2.0, 0.0, Coulomb(0.3), id="friction"),
+        pytest.param(2.0, 0.0, Coulomb(0.3), id="friction", marks=pytest.mark.slow),
         pytest.param(2.0, 2.0, Frictionless(), id="spin", marks=pytest.mark.slow),
     ],
 )
@@ -89,7 +89,13 @@ def test_a_disc_that_rolls_with_the_speed_of_its_spin():
     assert run([disc(24, velocity=2.0, spin=-2.0), block()], Frictionless(), 0.005)[0] < 2e-3
 
 
-@pytest.mark.parametrize("law", [Frictionless(), Coulomb(0.3)], ids=["frictionless", "friction"])
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(Frictionless(), id="frictionless", marks=pytest.mark.slow),
+        pytest.param(Coulomb(0.3), id="friction"),
+    ],
+)
 def test_a_block_that_falls_flat(law):
     """Contact of flat surfaces has no error in space: rest is exact, and the error of impacts falls with the step."""
     assert run([block()], law, 0.005, 0.1)[0] < 1e-4

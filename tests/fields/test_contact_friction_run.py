@@ -59,6 +59,7 @@ def test_a_sliding_block(sliding):
     assert sliding["iterations"].max() <= 8
 
 
+@pytest.mark.slow
 def test_processes_agree(sliding, tmp_path):
     (tmp_path / "case.yaml").write_text(SLIDING)
     result = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=2)
@@ -139,7 +140,7 @@ def tension_at_the_end(folder, friction, moved, cells=45):
     [("{coefficient: 0.3}", np.exp(0.3 * np.pi / 1.01), 6e-3), ("{bound: 0.2}", 1.0 + 0.2 * np.pi / 1.01, 2e-3)],
     ids=["coulomb", "tresca"],
 )
-@pytest.mark.parametrize("cells", [45, 90])
+@pytest.mark.parametrize("cells", [45, pytest.param(90, marks=pytest.mark.slow)])
 def test_belt_around_a_drum(tmp_path, friction, tension, error, cells):
     """The end turns with the belt, so that nothing bends.
 

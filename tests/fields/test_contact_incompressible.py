@@ -39,7 +39,11 @@ output: {{fields_every: 0}}
 
 @pytest.mark.parametrize(
     ("cells", "order", "bulk", "element"),
-    [("[8, 6]", 2, 2000, "mixed"), ("[7, 5]", 1, 200000, "mixed"), ("[8, 6]", 2, 2000, "displacement")],
+    [
+        pytest.param("[8, 6]", 2, 2000, "mixed", marks=pytest.mark.slow),
+        ("[7, 5]", 1, 200000, "mixed"),
+        ("[8, 6]", 2, 2000, "displacement"),
+    ],
 )
 def test_a_seal_repeats_no_step(tmp_path, cells, order, bulk, element):
     """The wall carries the pressure on the other side, 2 MPa on 2.7 mm, and each step takes a few Newton steps."""
@@ -56,7 +60,10 @@ def test_a_seal_repeats_no_step(tmp_path, cells, order, bulk, element):
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.4999])
-@pytest.mark.parametrize(("cell_type", "element"), [("quad", "displacement"), ("quad9", "mixed"), ("tetra", "mixed")])
+@pytest.mark.parametrize(
+    ("cell_type", "element"),
+    [("quad", "displacement"), ("quad9", "mixed"), pytest.param("tetra", "mixed", marks=pytest.mark.slow)],
+)
 def test_modulus_of_surfaces(cell_type, element, nu):
     """E* / M = (1 - 2 nu) / (1 - nu)^2, wherever the body is."""
     mu, lmbda = 1.0 / (2 * (1 + nu)), nu / ((1 + nu) * (1 - 2 * nu))

@@ -67,21 +67,31 @@ probes:
 """
 
 
-def test_impact_on_two_processes(tmp_path):
-    (tmp_path / "case.yaml").write_text(COLLISION)
-    found = []
-    for method, processes in (("direct", 1), ("ilu", 1), ("ilu", 2), ("auto", 2)):
-        out = tmp_path / f"{method}{processes}"
-        change = [f"solver.linear.method={method}", "solver.linear.tolerance=1e-12", "output.fields_every=0"]
-        run = fsci("run", tmp_path, "-o", out, *(w for c in change for w in ("--set", c)), processes=processes)
-        assert run.returncode == 0, run.stdout + run.stderr
-        found.append(read_history(out / "history.csv"))
-    direct, *others = found
+def collision(folder, method, processes):
+    """History of the impact."""
+    (folder / "case.yaml").write_text(COLLISION)
+    change = [f"solver.linear.method={method}", "solver.linear.tolerance=1e-12", "output.fields_every=0"]
+    words = [word for setting in change for word in ("--set", setting)]
+    run = fsci("run", folder, "-o", folder / "out", *words, processes=processes)
+    assert run.returncode == 0, run.stdout + run.stderr
+    return read_history(folder / "out" / "history.csv")
+
+
+@pytest.fixture(scope="module")
+def direct(tmp_path_factory):
+    return collision(tmp_path_factory.mktemp("direct"), "direct", 1)
+
+
+@pytest.mark.parametrize(
+    ("method", "processes"),
+    [("ilu", 2), *(pytest.param(*other, marks=pytest.mark.slow) for other in (("ilu", 1), ("auto", 2)))],
+)
+def test_impact(tmp_path, direct, method, processes):
     assert direct["contact.active"].max() > 4
-    for ilu in others:
-        assert (ilu["iterations"] == direct["iterations"]).all()
-        for column in ("right.x", "right.y", "right.z"):
-            assert ilu[column] == pytest.approx(direct[column], rel=1e-8), column
-        for axis in "xyz":
-            change = np.abs(ilu[f"momentum.{axis}"] - ilu[f"momentum.{axis}"][0]).max()
-            assert change < 1e-9 * np.abs(direct["momentum.x"][0])
+    found = collision(tmp_path, method, processes)
+    assert (found["iterations"] == direct["iterations"]).all()
+    for column in ("right.x", "right.y", "right.z"):
+        assert found[column] == pytest.approx(direct[column], rel=1e-8), column
+    for axis in "xyz":
+        change = np.abs(found[f"momentum.{axis}"] - found[f"momentum.{axis}"][0]).max()
+        assert change < 1e-9 * np.abs(direct["momentum.x"][0])

@@ -65,6 +65,7 @@ def test_contact_force_is_the_reaction(plate):
     assert history["contact.press.z"].min() < -100
 
 
+@pytest.mark.slow
 def test_processes_agree(plate, tmp_path):
     """Contact closes, opens and closes again."""
     alone = {name: column[:5] for name, column in plate[1].items()}

@@ -84,7 +84,7 @@ KINDS = [
     (1, "quad"),
     pytest.param(1, "tri", marks=pytest.mark.slow),
     pytest.param(2, "quad", marks=pytest.mark.slow),
-    (2, "tri"),
+    pytest.param(2, "tri", marks=pytest.mark.slow),
 ]
 
 

@@ -106,12 +106,13 @@ NOT_COMPARED = ("wall", "residual", "fluid.mass", "interface.", "coupling.")
 @pytest.mark.parametrize(
     ("case", "processes"),
     [
-        (ONE_CELL_ON_A_BLOCK, 3),
+        (ONE_CELL_ON_A_BLOCK, 2),
+        pytest.param(ONE_CELL_ON_A_BLOCK, 3, marks=pytest.mark.slow),
         pytest.param(ONE_CELL_IN_MOTION, 4, marks=pytest.mark.slow),
         pytest.param(FLOW_OF_TWO_CELLS, 4, marks=pytest.mark.slow),
         pytest.param(FLAP_OF_ONE_CELL, 4, marks=pytest.mark.slow),
     ],
-    ids=["contact", "motion", "flow", "coupled"],
+    ids=["contact on 2", "contact", "motion", "flow", "coupled"],
 )
 def test_fewer_cells_than_processes(case, processes, tmp_path):
     (tmp_path / "case.yaml").write_text(case)

@@ -77,7 +77,7 @@ def box(cells: tuple[int, int], scale: float = 1.0) -> Grid:
     return uniform([0, 0], [2 * scale, scale], list(cells))
 
 
-@pytest.mark.parametrize("parts", [1, 20])
+@pytest.mark.parametrize("parts", [pytest.param(1, marks=pytest.mark.slow), 20])
 @pytest.mark.parametrize(
     ("element", "grid", "off"),
     [

@@ -50,7 +50,9 @@ def energies(fluid, steps):
     return np.array(found)
 
 
-@pytest.mark.parametrize(("kind", "law"), [("outflow", None), ("resistance", Windkessel(3.0))])
+@pytest.mark.parametrize(
+    ("kind", "law"), [("outflow", None), pytest.param("resistance", Windkessel(3.0), marks=pytest.mark.slow)]
+)
 def test_a_vortex_leaves(kind, law):
     """It turns four times as fast as the flow that carries it: the outlet sees backflow. Nothing remains."""
     fluid = with_vortex(kind, 4.0, law=law)

@@ -101,9 +101,16 @@ def rates(bodies, element, dt, steps, scheme):
     return np.array(found)
 
 
-@pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize(
-    ("element", "scheme", "dt"), [("q1q1", "backward_euler", 0.1), ("q1q1", "bdf2", 0.05), ("q2q1", "bdf2", 0.1)]
+    ("element", "scheme", "dt", "place"),
+    [
+        ("q1q1", "backward_euler", 0.1, PLACES[0]),
+        ("q1q1", "bdf2", 0.05, PLACES[1]),
+        ("q2q1", "bdf2", 0.1, PLACES[2]),
+        *(pytest.param("q1q1", "backward_euler", 0.1, place, marks=pytest.mark.slow) for place in PLACES[1:]),
+        *(pytest.param("q1q1", "bdf2", 0.05, place, marks=pytest.mark.slow) for place in (PLACES[0], PLACES[2])),
+        *(pytest.param("q2q1", "bdf2", 0.1, place, marks=pytest.mark.slow) for place in PLACES[:2]),
+    ],
 )
 def test_cylinder_that_slides_between_walls(element, scheme, dt, place):
     """It drives before it what it sweeps, and when it stops nothing flows: 0.18 % of an open channel did."""

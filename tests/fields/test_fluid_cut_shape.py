@@ -140,7 +140,7 @@ def with_more(flow, u, p, v, q, bulk=forms.bulk):
     return bulk(flow, u, p, v, q) + 3.0 * u2 * ufl.dot(u, v) + u2 * q + more
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_term_of_the_forms_alone(dim, monkeypatch):
     """Terms that `forms` alone has are differentiated: what they add is exact, row by row, in any flow."""
     added, walls = (

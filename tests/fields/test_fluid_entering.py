@@ -89,8 +89,15 @@ GIVEN = 'motion: {displacement: [0, "-0.317*ramp(t, 0, 0.4)"]}'
 FREE = "free: {density: 20, gravity: [0, -8], held: [x, rotation]}"
 
 
-@pytest.mark.parametrize("x", [1.2, 1.233])
-@pytest.mark.parametrize("how", [GIVEN, FREE])
+@pytest.mark.parametrize(
+    ("how", "x"),
+    [
+        (GIVEN, 1.233),
+        (FREE, 1.2),
+        pytest.param(GIVEN, 1.2, marks=pytest.mark.slow),
+        pytest.param(FREE, 1.233, marks=pytest.mark.slow),
+    ],
+)
 def test_a_gate_that_closes_below_opens_above(how, x, tmp_path):
     """Fluid begins above it, and nothing is lost; the volume of the fluid is that beside and above the gate."""
     coupling = "coupling: {scheme: monolithic}" if how == FREE else ""

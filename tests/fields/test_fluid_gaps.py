@@ -115,7 +115,9 @@ def through(gap, place, angle=0.0, length=2.5):
     return flow_rate(fluid)(["out"]) / ((gap * h) ** 3 / (12 * mu) / length)
 
 
-@pytest.mark.parametrize("gap", [1, 0.7, 0.5, 0.25, 0.1, 0.05])
+@pytest.mark.parametrize(
+    "gap", [1, pytest.param(0.7, marks=pytest.mark.slow), 0.5, pytest.param(0.25, marks=pytest.mark.slow), 0.1, 0.05]
+)
 def test_flow_through_a_gap(gap):
     """Within 6 %, 3 % of it at both ends, wherever the gap is in the grid; 0.12 to 1.24 without the term."""
     ratios = np.array([through(gap, place) for place in (0.0, 0.13, 0.31, 0.5, 0.77, 0.95)])
@@ -187,7 +189,9 @@ def test_cylinder_in_motion():
     assert np.abs(np.diff(ratios[:, 1])).max() < 0.04  # it falls from 1.15 to 0.95, without jumps
 
 
-@pytest.mark.parametrize("gap", [pytest.param(1, marks=pytest.mark.slow), 0.5, 0.2])
+@pytest.mark.parametrize(
+    "gap", [pytest.param(1, marks=pytest.mark.slow), pytest.param(0.5, marks=pytest.mark.slow), 0.2]
+)
 def test_sphere_at_a_wall(gap):
     """Within 14 %; without the term 1.23 and 1.44."""
     ratio = drag_ratio(3, gap * H, H, "q1q1", growth=1.3, fine=0.6, size=5.0, narrow_gaps=True)

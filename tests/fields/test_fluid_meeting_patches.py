@@ -97,6 +97,7 @@ def test_edges_between_unequal_cells():
     check()
 
 
+@pytest.mark.slow
 def test_two_processes():
     on_processes(2, __file__)
 

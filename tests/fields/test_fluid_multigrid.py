@@ -204,7 +204,7 @@ def test_nested_cells_take_few_iterations():
     assert max(counts) <= 10
 
 
-@pytest.mark.parametrize("dt", [None, 1e-3])
+@pytest.mark.parametrize("dt", [None, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_second_degree_around_a_ball(dt):
     """Cut cells at which incomplete factors alone stall, with cells to a radius at which errors grew most."""
     grid = uniform([-2.0] * 3, [2.0] * 3, [7] * 3)
@@ -235,6 +235,7 @@ def test_second_degree_on_nested_cells():
     assert around_a_ball(grid, "iterative", "q2q1")[1] <= 15
 
 
+@pytest.mark.slow
 def test_second_degree_on_two_processes():
     """The exact factors are those of the unknowns near the ball of both processes."""
     on_processes(2, __file__)

@@ -67,6 +67,7 @@ def pull(thickness, cells):
     return fluid.force()["plate"].sum(axis=0)[0]
 
 
+@pytest.mark.slow
 def test_drag_of_a_plate_thinner_than_a_cell():
     """Both faces cut the same cells: one velocity and one pressure serve both sides, so that the pressure leaks.
 

@@ -68,13 +68,13 @@ def kovasznay_errors(element, cells):
     return errors(fluid, *exact[:3])
 
 
-@pytest.mark.parametrize("element", BARS)
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
 def test_kovasznay_around_a_disc(element):
     found = np.array([kovasznay_errors(element, cells) for cells in (16, 32, 64)])
     assert np.all(rates(found)[-1] >= BARS[element]), (found, rates(found))
 
 
-@pytest.mark.parametrize("element", BARS)
+@pytest.mark.parametrize("element", [pytest.param("q1q1", marks=pytest.mark.slow), "q2q1"])
 def test_errors_do_not_depend_on_the_position(element):
     """A disc is shifted through one cell in twenty steps."""
     cells = 16

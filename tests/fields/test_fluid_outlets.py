@@ -235,7 +235,8 @@ def test_unequal_cells_at_the_outlet():
 
 
 @pytest.mark.parametrize(("dim", "element", "linear"), [
-    (2, "q1q1", "ilu"), (2, "q2q1", "iterative"), (3, "q1q1", "ilu"), (3, "q1q1", "iterative")
+    (2, "q1q1", "ilu"), (2, "q2q1", "iterative"), (3, "q1q1", "iterative"),
+    pytest.param(3, "q1q1", "ilu", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_iterative_solvers_take_few_more_iterations(dim, element, linear):
     """One with a good preconditioner, a few with incomplete factors, whatever the resistance."""

@@ -18,9 +18,10 @@ PROGRAM = Path(__file__).parents[1] / "setups" / "fluid_parallel.py"
 @pytest.mark.parametrize(
     ("dim", "element", "boxes", "numbers"),
     [
-        (2, "q1q1", ("channel", "closed", "film", "nested"), (1, 3)),
+        (2, "q1q1", ("channel", "closed", "film", "nested"), (1, 2)),
+        pytest.param(2, "q1q1", ("channel", "closed", "film", "nested"), (1, 3), marks=pytest.mark.slow),
         pytest.param(2, "q2q1", ("closed", "periodic", "film", "nested"), (1, 2, 3), marks=pytest.mark.slow),
-        (3, "q1q1", ("channel", "nested"), (1, 2)),
+        pytest.param(3, "q1q1", ("channel", "nested"), (1, 2), marks=pytest.mark.slow),
     ],
 )
 def test_processes_agree(tmp_path, dim, element, boxes, numbers):
@@ -46,7 +47,7 @@ def test_processes_agree(tmp_path, dim, element, boxes, numbers):
         (3, "q1q1", "channel"),
         (2, "q1q1", "nested"),
         pytest.param(2, "q2q1", "nested", marks=pytest.mark.slow),
-        (3, "q1q1", "nested"),
+        pytest.param(3, "q1q1", "nested", marks=pytest.mark.slow),
     ],
 )
 def test_resumed_run_is_the_same_bit_for_bit(dim, element, box):

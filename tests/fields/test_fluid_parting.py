@@ -45,8 +45,17 @@ def parting(dim, element, seat, cells):
     return rate(["in"]), rate(["out"])
 
 
-@pytest.mark.parametrize(("dim", "element"), [(2, "q1q1"), (2, "q2q1"), (3, "q1q1")])
-@pytest.mark.parametrize("seat", [0.5, 0.5 + 1.0 / 30, 0.4, 0.45])
+SEATS = (0.5, 0.5 + 1.0 / 30, 0.4, 0.45)
+
+
+@pytest.mark.parametrize(
+    ("dim", "element", "seat"),
+    [
+        *((2, element, seat) for element in ("q1q1", "q2q1") for seat in SEATS),
+        (3, "q1q1", SEATS[1]),
+        *(pytest.param(3, "q1q1", seat, marks=pytest.mark.slow) for seat in SEATS if seat != SEATS[1]),
+    ],
+)
 def test_blocks_part(dim, element, seat):
     """In a plane of the grid, a third of a cell above it, in another plane, in the middle of a cell."""
     into, out = parting(dim, element, seat, 10)

@@ -114,7 +114,9 @@ def disc_in_period(shift, element):
     return fluid
 
 
-@pytest.mark.parametrize("shift", [5, 10, 11, 16, -67])
+@pytest.mark.parametrize(
+    "shift", [5, pytest.param(10, marks=pytest.mark.slow), 11, pytest.param(16, marks=pytest.mark.slow), -67]
+)
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_a_period_begins_anywhere(element, shift):
     """Shifted by whole cells, the body feels the same and the flow is the same, shifted, also across the end."""
@@ -265,7 +267,7 @@ def test_a_body_as_long_as_the_period(length, fits):
     require_advice(failed.value, FailureKind.PERIODIC_FACES)
 
 
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
 def test_a_disc_moves_through_the_end(element):
     """At each of 30 positions, a tenth of a cell apart and more, its force is that of a disc within the period."""
     histories = []

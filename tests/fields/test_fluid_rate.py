@@ -247,7 +247,8 @@ def test_it_adds_to_a_body_force():
 
 
 @pytest.mark.parametrize(("dim", "element", "linear"), [
-    (2, "q1q1", "ilu"), (2, "q2q1", "iterative"), (3, "q1q1", "ilu"), (3, "q1q1", "iterative")
+    (2, "q1q1", "ilu"), (2, "q2q1", "iterative"), (3, "q1q1", "iterative"),
+    pytest.param(3, "q1q1", "ilu", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_iterative_solvers(dim, element, linear):
     """They take one more iteration or a few than for the force, and find the solution of the direct one."""

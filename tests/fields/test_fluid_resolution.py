@@ -223,6 +223,7 @@ def test_fluid_at_rest_says_nothing():
     assert max(one.error for one in resolved([found], "q1q1")) < 1e-3
 
 
+@pytest.mark.slow
 def test_two_processes_measure_the_same(tmp_path):
     program = tmp_path / "program.py"
     program.write_text(
@@ -390,7 +391,7 @@ def test_films_of_other_heights_than_the_benchmark(element, gap, cells):
     assert any(found.warns for found in resolved(measure(fluid), element)) == (error > 5.0)
 
 
-@pytest.mark.parametrize("scale", [1.0, 1.3])
+@pytest.mark.parametrize("scale", [pytest.param(1.0, marks=pytest.mark.slow), 1.3])
 @pytest.mark.parametrize(("element", "cells"), [("q2q1", 0.62), ("q2q1", 2.4), ("q1q1", 2.5)])
 def test_films_with_ends(element, cells, scale):
     """A block and a wall, in gaps that the table does not have: an end in a cell is off by up to a cell with q2q1.

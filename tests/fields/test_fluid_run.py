@@ -214,6 +214,7 @@ def test_a_resumed_flow_is_the_same_bit_for_bit(moving, tmp_path):
         assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
 
 
+@pytest.mark.slow
 def test_two_processes(moving, tmp_path):
     _, one = moving
     (tmp_path / "case.yaml").write_text(MOVING)

@@ -114,7 +114,9 @@ def two_channels(thickness, middle, grid):
 
 
 @pytest.mark.parametrize("nested", [False, True], ids=["equal cells", "nested cells"])
-@pytest.mark.parametrize("thickness", [1e-3, 0.2, 1.0, 1.5])
+@pytest.mark.parametrize(
+    "thickness", [1e-3, pytest.param(0.2, marks=pytest.mark.slow), 1.0, pytest.param(1.5, marks=pytest.mark.slow)]
+)
 def test_two_parabolas(thickness, nested):
     """Both flows are exact, also where the plate leaves the box, and in coarser cells; it carries half of the force."""
     equal = uniform([0, 0], [1, 1], [6, 10])

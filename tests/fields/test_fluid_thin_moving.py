@@ -62,7 +62,9 @@ def test_plate_that_moves_along_a_channel(element, thickness, draws):
 
 
 @pytest.mark.parametrize("draws", DRAWS, ids=str)
-@pytest.mark.parametrize("thickness", [3.2, 3.5, 4.2, 5.0, 5.5])
+@pytest.mark.parametrize(
+    "thickness", [3.2, pytest.param(3.5, marks=pytest.mark.slow), 4.2, pytest.param(5.0, marks=pytest.mark.slow), 5.5]
+)
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_thicker_plate_that_hardly_moves(element, thickness, draws):
     """Strips behind both sides, of a cut cell and one more in any direction, would meet within five cells."""
@@ -71,7 +73,9 @@ def test_thicker_plate_that_hardly_moves(element, thickness, draws):
 
 
 @pytest.mark.parametrize("draws", DRAWS, ids=str)
-@pytest.mark.parametrize("thickness", [3.06, 3.3, 3.5, 4.2, 5.5])
+@pytest.mark.parametrize(
+    "thickness", [3.06, pytest.param(3.3, marks=pytest.mark.slow), 3.5, pytest.param(4.2, marks=pytest.mark.slow), 5.5]
+)
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_inclined_plate_that_hardly_moves(element, thickness, draws):
     """Inclined by 35 to 50 degrees, its strips would meet in diagonal directions."""
@@ -330,7 +334,8 @@ probes:
 COLUMNS = ("force.x", "force.y", "before", "behind", "rate", "energy", "volume", "fluid.mass")
 
 
-@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_two_processes(tmp_path, element):
     """A plate with both ends in the flow, and a run that goes on with other processes; all probes follow it."""
     (tmp_path / "case.yaml").write_text(CASE.format(element=element))
@@ -401,8 +406,14 @@ probes:
 """
 
 
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
-@pytest.mark.parametrize("flow", ["stokes", "navier_stokes"])
+@pytest.mark.parametrize(
+    ("element", "flow"),
+    [
+        ("q1q1", "stokes"),
+        ("q2q1", "navier_stokes"),
+        *(pytest.param(*other, marks=pytest.mark.slow) for other in (("q1q1", "navier_stokes"), ("q2q1", "stokes"))),
+    ],
+)
 def test_a_steady_flow_has_no_history(tmp_path, element, flow):
     """A thin plate that comes from seven cells away has the forces of one that has always been there."""
     found = []

@@ -32,8 +32,9 @@ def channel(plate, element, pressures, levels=1):
 
 
 @pytest.mark.parametrize("thickness", THICKNESSES)
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
-@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize(
+    ("element", "levels"), [("q1q1", 1), ("q2q1", 1), ("q1q1", 2), pytest.param("q2q1", 2, marks=pytest.mark.slow)]
+)
 def test_plate_that_seals_a_channel(element, thickness, levels):
     """Pressures on both sides are constant; nothing flows, and the plate carries their difference."""
     pressures, size = (2.0, 0.7), 0.125 / 2**levels
@@ -110,7 +111,9 @@ def pushed(thickness, element, following, number, size=0.0625, dt=0.1):
     return off, len(grids)
 
 
-@pytest.mark.parametrize("thickness", [1e-3, 0.2, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "thickness", [pytest.param(1e-3, marks=pytest.mark.slow), 0.2, pytest.param(1.0, marks=pytest.mark.slow), 3.0]
+)
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_plate_that_moves_along_a_channel(element, thickness):
     """Nothing passes it, and it carries the difference of the pressures in each step, also where it enters cells."""
@@ -118,8 +121,14 @@ def test_plate_that_moves_along_a_channel(element, thickness):
     assert (off < 1e-9).all()
 
 
-@pytest.mark.parametrize("thickness", [1e-3, 1.0])
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize(
+    ("element", "thickness"),
+    [
+        ("q1q1", 1e-3),
+        ("q2q1", 1.0),
+        *(pytest.param(*some, marks=pytest.mark.slow) for some in (("q1q1", 1.0), ("q2q1", 1e-3))),
+    ],
+)
 def test_cells_follow_a_plate(element, thickness):
     """The same where its cells go with it."""
     off, grids = pushed(thickness, element, following=True, number=7)
@@ -167,7 +176,9 @@ def results(folder, element, refine, processes, resumed):
     return history
 
 
-@pytest.mark.parametrize("refine", [BOXED, FOLLOWED], ids=["boxed", "followed"])
+@pytest.mark.parametrize(
+    "refine", [pytest.param(BOXED, id="boxed", marks=pytest.mark.slow), pytest.param(FOLLOWED, id="followed")]
+)
 @pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
 def test_two_processes(tmp_path, element, refine):
     """A plate with both ends in the flow, and a run that goes on with other processes; all probes follow it."""

@@ -63,7 +63,7 @@ def test_fluid_within_a_ring_is_at_rest(element, thickness):
     assert beside[0] > 1e-3
 
 
-@pytest.mark.parametrize("thickness", [1e-3, 0.05, 0.2])
+@pytest.mark.parametrize("thickness", [1e-3, pytest.param(0.05, marks=pytest.mark.slow), 0.2])
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_ring_that_moves_with_the_flow(element, thickness):
     """Nothing disturbs a uniform flow."""
@@ -107,7 +107,8 @@ probes:
 COLUMNS = ("force.x", "force.y", "before", "section", "energy", "fluid.mass")
 
 
-@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_two_processes(tmp_path, element):
     """A leaf that moves in a periodic flow, and runs that go on with other processes."""
     (tmp_path / "case.yaml").write_text(CASE.format(element=element))

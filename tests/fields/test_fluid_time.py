@@ -44,7 +44,7 @@ def error(scheme, element, steps, moving=True):
         ("q1q1", "bdf2", 2),
         ("q1q1", "bdf2_optimized", 2),
         pytest.param("q2q1", "backward_euler", 1, marks=pytest.mark.slow),
-        ("q2q1", "bdf2", 2),
+        pytest.param("q2q1", "bdf2", 2, marks=pytest.mark.slow),
         pytest.param("q2q1", "bdf2_optimized", 2, marks=pytest.mark.slow),
     ],
 )

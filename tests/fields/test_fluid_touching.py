@@ -60,7 +60,7 @@ def plates(thickness, depth, draw):
 
 
 @pytest.mark.parametrize("draws", DRAWS, ids=str)
-@pytest.mark.parametrize("depth", [0.0, 0.02, 0.5])
+@pytest.mark.parametrize("depth", [0.0, pytest.param(0.02, marks=pytest.mark.slow), 0.5])
 @pytest.mark.parametrize("thickness", [0.05, 0.3, 1.0])
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_two_plates_that_seal_a_channel(element, thickness, depth, draws):
@@ -95,8 +95,14 @@ def errors(element, below, above, speed=0.0, steps=1):
 
 
 @pytest.mark.parametrize("draws", [(0, 17), pytest.param(range(1, 20), marks=pytest.mark.slow)], ids=str)
-@pytest.mark.parametrize("thickness", [0.05, 0.3])
-@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize(
+    ("element", "thickness"),
+    [
+        ("q1q1", 0.05),
+        ("q2q1", 0.3),
+        *(pytest.param(*other, marks=pytest.mark.slow) for other in (("q1q1", 0.3), ("q2q1", 0.05))),
+    ],
+)
 def test_two_plates_that_move_along_a_channel(element, thickness, draws):
     """They overlap, and move with the fluid by 0.7 cells in each step: it stays uniform, and they carry (p1 - p2) A."""
     # nodes of second degree at slivers of fluid are extended from far away

@@ -56,7 +56,7 @@ def arch_under_a_plate(length, order=1):
     ("step", "length"),
     [
         (0.025, 1.0),
-        (0.0125, 1e-3),
+        pytest.param(0.0125, 1e-3, marks=pytest.mark.slow),
         pytest.param(0.025, 1e-3, marks=pytest.mark.slow),
         pytest.param(0.0125, 1.0, marks=pytest.mark.slow),
     ],

@@ -165,7 +165,15 @@ def test_bounds_of_the_scale_do_not_matter(monkeypatch):
     assert found[2] == pytest.approx(found[0], rel=1e-3)
 
 
-@pytest.mark.parametrize(("ways", "edges"), [(1.0, 0.2), (200.0, 0.2), (2.0, 0.002), (2.0, 20.0)])
+@pytest.mark.parametrize(
+    ("ways", "edges"),
+    [
+        pytest.param(1.0, 0.2, marks=pytest.mark.slow),
+        (200.0, 0.2),
+        (2.0, 0.002),
+        pytest.param(2.0, 20.0, marks=pytest.mark.slow),
+    ],
+)
 def test_how_early_a_pair_is_present_does_not_matter(monkeypatch, ways, edges):
     """A block bounces off a wall, with a pair that appears just before the impact or is present all the time.
 

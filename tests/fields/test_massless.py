@@ -163,7 +163,8 @@ def exact_tip(t):
 
 
 @pytest.mark.parametrize(
-    ("steps_per_cell", "until", "most", "ringing"), [(1.4, 3.0, 0.515, 0.001), (2.5, 1.6, 0.8, 0.06)]
+    ("steps_per_cell", "until", "most", "ringing"),
+    [(1.4, 3.0, 0.515, 0.001), pytest.param(2.5, 1.6, 0.8, 0.06, marks=pytest.mark.slow)],
 )
 def test_bar_impact(steps_per_cell, until, most, ringing):
     """The pressure is 1/2 throughout: no overshoot, no ringing, nothing gained, hardly anything lost.
@@ -188,6 +189,7 @@ def test_bar_impact(steps_per_cell, until, most, ringing):
     assert energy[-1] == pytest.approx(energy[0], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_bar_impact_converges():
     errors = []
     for cells in (10, 40):

@@ -122,6 +122,7 @@ def test_own_law_equals_that_of_the_program(tmp_path, element, text):
     np.testing.assert_allclose(own["right.x"], known["right.x"], rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_two_processes_and_a_resumed_run(tmp_path):
     material = "{law: 'laws.py:Yeoh', parameters: {c10: 2, c20: 0.1, bulk: 50}}"
     one = run(folder_of(tmp_path / "one", material, end=1))

@@ -120,7 +120,8 @@ def test_with_active_and_relaxing_stress(tmp_path):
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(
-    ("cell_type", "element"), [("quad", "displacement"), ("quad", "mixed"), ("hexahedron", "mixed")]
+    ("cell_type", "element"),
+    [("quad", "displacement"), ("quad", "mixed"), pytest.param("hexahedron", "mixed", marks=pytest.mark.slow)],
 )
 def test_tangent_with_pre_stretch(law, cell_type, element):
     """That varies from cell to cell, in an oblique direction and all, with active and relaxing stress."""

@@ -249,7 +249,7 @@ def test_a_square_falls_on_the_floor_and_stays(rho_inf):
 def test_an_impact_gives_back_the_share_of_its_restitution():
     bodies = falling_square(restitution=0.5)
     highest, fell = -1.0, False
-    for t, _ in march(bodies, 0.9, 900):
+    for t, _ in march(bodies, 0.9, 450):
         fell |= t > np.sqrt(0.2) + 0.01
         if fell:
             highest = max(highest, bodies.now[0].shift[1])

@@ -70,6 +70,7 @@ def test_run_and_resume(tmp_path, scheme):
         assert np.array_equal(once[name], twice[name], equal_nan=True), name
 
 
+@pytest.mark.slow
 def test_two_processes(tmp_path):
     path, histories = write(tmp_path), []
     for processes in (1, 2):

@@ -91,6 +91,7 @@ def test_a_stack_stands_on_a_wall():
     assert bodies.contact.z[on_floor, 0].sum() == pytest.approx(90.0, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_order_of_bodies_does_not_matter():
     """Four discs fall on each other in a corner."""
     walls = [FLOOR, RigidWall("side", np.array([-1.0, 0.0]), np.array([1.0, 0.0]))]

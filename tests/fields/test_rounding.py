@@ -95,7 +95,14 @@ probes:
 """
 
 
-@pytest.mark.parametrize("meter", [1.0, 1e6, 1e-6], ids=["in m", "in um", "in Mm"])
+@pytest.mark.parametrize(
+    "meter",
+    [
+        pytest.param(1.0, id="in m", marks=pytest.mark.slow),
+        pytest.param(1e6, id="in um"),
+        pytest.param(1e-6, id="in Mm", marks=pytest.mark.slow),
+    ],
+)
 def test_coupled_system_comes_to_rest(tmp_path, meter):
     """`piston_impact` with a short way, its lengths in three units: the impact and the rest after it need no retry."""
     text = PISTON.format(

@@ -284,6 +284,7 @@ def test_a_resumed_ring_claps_alike(clapping, tmp_path):
         assert np.array_equal(clapping[name], resumed[name]), name
 
 
+@pytest.mark.slow
 def test_processes_clap_alike(clapping, tmp_path):
     (tmp_path / "case.yaml").write_text(CLAPPING)
     done = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=2)
@@ -405,13 +406,27 @@ output: {fields_every: 0}
 """
 
 
-def test_the_ends_of_a_clip_do_not_pass_in_one_step(tmp_path):
+#: The same in the plane.
+CLIP_2D = (
+    CLIP.replace("shape: tube", "shape: ring")
+    .replace("height: 0.3, cells: [48, 2, 1]", "cells: [48, 2]")
+    .replace("[-1.1, 0, 0], displacement: [0, 0, null]", "[-1.1, 0], displacement: [0, 0]")
+    .replace("[-0.9, 0, 0], displacement: [null, 0, null]", "[-0.9, 0], displacement: [null, 0]")
+    .replace("        - {on: bottom, symmetry: true}\n", "")
+    .replace("0.37622216, 0]", "0.37622216]")
+)
+
+
+@pytest.mark.parametrize(
+    "clip", [pytest.param(CLIP_2D, id="plane"), pytest.param(CLIP, id="space", marks=pytest.mark.slow)]
+)
+def test_the_ends_of_a_clip_do_not_pass_in_one_step(tmp_path, clip):
     """With one step they stop on each other as with small ones."""
     found = []
     for step in (0.1, 0.02):
         folder = tmp_path / str(step)
         folder.mkdir()
-        (folder / "case.yaml").write_text(CLIP.replace("STEP", str(step)))
+        (folder / "case.yaml").write_text(clip.replace("STEP", str(step)))
         assert run_case(load_case(folder / "case.yaml"), folder / "out") == FINISHED
         history = read_history(folder / "out" / "history.csv")
         found.append([history[column][-1] for column in ("upper.y", "lower.y", "contact.active")])

@@ -57,8 +57,14 @@ def dragged(cell_type, laws, split, *, order=1):
     return make_contact([body], pairs[::order], settings=LOOSER)
 
 
-@pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])
-@pytest.mark.parametrize("split", [1 / 3, 0.431, 0.95])
+@pytest.mark.parametrize(
+    ("cell_type", "split"),
+    [
+        *(("quad", split) for split in (1 / 3, 0.431, 0.95)),
+        ("hexahedron", 0.431),
+        *(pytest.param("hexahedron", split, marks=pytest.mark.slow) for split in (1 / 3, 0.95)),
+    ],
+)
 @pytest.mark.parametrize("name", LAWS)
 def test_a_block_on_two_floors(name, split, cell_type):
     """The plate is thin, so that the pressure is even: each floor resists by its law times its area.
@@ -160,6 +166,7 @@ probes:
 """
 
 
+@pytest.mark.slow
 def test_named_and_found_pairs_on_several_processes_and_resumed(tmp_path):
     (tmp_path / "case.yaml").write_text(CASE)
     case = load_case(tmp_path / "case.yaml")

@@ -76,8 +76,17 @@ def close(mesh, sides, law=Frictionless(), way=0.3):
     return np.array(found).T, at_nodes
 
 
-@pytest.mark.parametrize("law", [Frictionless(), Coulomb(0.3)], ids=["frictionless", "coulomb"])
-@pytest.mark.parametrize(("dim", "opening"), [(2, 0.1), (2, 0.05), (3, 0.1)])
+@pytest.mark.parametrize(
+    ("law", "dim", "opening"),
+    [
+        pytest.param(Frictionless(), 2, 0.1, id="frictionless-2-0.1"),
+        pytest.param(Coulomb(0.3), 2, 0.05, id="coulomb-2-0.05"),
+        pytest.param(Frictionless(), 3, 0.1, id="frictionless-3-0.1"),
+        pytest.param(Coulomb(0.3), 2, 0.1, id="coulomb-2-0.1", marks=pytest.mark.slow),
+        pytest.param(Frictionless(), 2, 0.05, id="frictionless-2-0.05", marks=pytest.mark.slow),
+        pytest.param(Coulomb(0.3), 3, 0.1, id="coulomb-3-0.1", marks=pytest.mark.slow),
+    ],
+)
 def test_lips_close_as_a_surface_on_itself(dim, law, opening):
     """No force before the lips touch, then that of self contact; who is slave changes the error of the mesh only."""
     mesh = notched(opening, dim=dim)

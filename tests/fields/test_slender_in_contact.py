@@ -104,6 +104,7 @@ def test_in_millimetres(tmp_path):
     assert 1000 * borne(tmp_path, beam(0.001), q=0.001 * Q) == pytest.approx(BORNE, rel=0.015)
 
 
+@pytest.mark.slow
 def test_resumed_and_on_two_processes(tmp_path):
     whole = borne(tmp_path / "whole", BEAM)
     borne(tmp_path / "half", BEAM, "--set", "time.end=0.5")

@@ -46,7 +46,12 @@ def swing(rho_inf, dt):
 
 
 @pytest.mark.parametrize(
-    ("rho_inf", "dt"), [(1.0, 0.0025), (0.8, 0.0025), pytest.param(0.0, 0.00125, marks=pytest.mark.slow)]
+    ("rho_inf", "dt"),
+    [
+        pytest.param(1.0, 0.0025, marks=pytest.mark.slow),
+        (0.8, 0.0025),
+        pytest.param(0.0, 0.00125, marks=pytest.mark.slow),
+    ],
 )
 def test_second_order(rho_inf, dt):
     coarse, middle, fine = (swing(rho_inf, dt / 2**k) for k in range(3))

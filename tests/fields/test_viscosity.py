@@ -55,7 +55,9 @@ def test_undeformed_bodies_have_the_stiffness_of_their_material(material):
     assert times(Viscosity(body).matrix(), v) == pytest.approx(times(K, v), rel=1e-11, abs=1e-10)
 
 
-@pytest.mark.parametrize("cell_type", ["quad", "hexahedron", "quad9", "hexahedron27"])
+@pytest.mark.parametrize(
+    "cell_type", ["quad", "hexahedron", "quad9", pytest.param("hexahedron27", marks=pytest.mark.slow)]
+)
 def test_mixed_elements_do_not_lock(cell_type):
     """The power of smooth velocities that keep the volume is that by the stiffness of the mixed element."""
     body = make_body("block", block(cell_type, 3), NeoHooke(400.0, 6e5, 2.0), element="mixed")
@@ -114,8 +116,17 @@ def test_derivative_by_the_displacement(cell_type, element):
     assert times(viscosity.turning(v), du) == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("damping", [Damping(), Damping(0.0, 1e-3), Damping(0.0, 0.1)], ids=["none", "weak", "strong"])
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(
+    ("dim", "damping"),
+    [
+        pytest.param(2, Damping(), id="2-none"),
+        pytest.param(2, Damping(0.0, 1e-3), id="2-weak"),
+        pytest.param(3, Damping(0.0, 0.1), id="3-strong"),
+        pytest.param(2, Damping(0.0, 0.1), id="2-strong", marks=pytest.mark.slow),
+        pytest.param(3, Damping(), id="3-none", marks=pytest.mark.slow),
+        pytest.param(3, Damping(0.0, 1e-3), id="3-weak", marks=pytest.mark.slow),
+    ],
+)
 def test_a_block_that_spins_keeps_its_spin(dim, damping):
     """Half a turn."""
     cell_type = "quad" if dim == 2 else "hexahedron"

@@ -63,7 +63,7 @@ def test_both_ways_give_the_same_matrix(size, monkeypatch):
     assert np.abs(found[0]).max() > 0.0
 
 
-@pytest.mark.parametrize("processes", [2, 3])
+@pytest.mark.parametrize("processes", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_both_ways_give_the_same_matrix_on_several_processes(processes):
     on_processes(processes, PROGRAM)
 

@@ -61,7 +61,7 @@ def assert_many(dim: int, side: int, n: int, vertices: np.ndarray, facets: np.nd
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_random_tetrahedra(share, seed):
     side = 21
     rng = np.random.default_rng([int(10 * share), seed])

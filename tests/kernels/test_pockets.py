@@ -69,7 +69,7 @@ def test_pockets_are_the_closed_parts():
     check(MPI.COMM_SELF)
 
 
-@pytest.mark.parametrize("processes", [2, 3, 4])
+@pytest.mark.parametrize("processes", [2, *(pytest.param(count, marks=pytest.mark.slow) for count in (3, 4))])
 def test_pockets_on_several_processes(processes):
     on_processes(processes, __file__)
 

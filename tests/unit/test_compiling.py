@@ -59,7 +59,9 @@ def test_compilation_is_reported(cache):
     assert not list((folder / "fenics").glob("*.lock"))
 
 
-@pytest.mark.parametrize("lock", [True, False], ids=["by this program", "by another one"])
+@pytest.mark.parametrize(
+    "lock", [pytest.param(True, id="by this program"), pytest.param(False, id="by another one", marks=pytest.mark.slow)]
+)
 def test_form_of_a_killed_process_is_compiled_anew(cache, lock):
     """Its source is there, half written, and no mark that it is complete."""
     folder, _ = cache

@@ -36,7 +36,9 @@ fluid:
 
 
 @pytest.mark.parametrize("folder", CASES, ids=lambda folder: folder.name)
-@pytest.mark.parametrize("factor", [2.0**0.5, 2.0, 2.0**-0.5])
+@pytest.mark.parametrize(
+    "factor", [pytest.param(2.0**0.5, marks=pytest.mark.slow), 2.0, pytest.param(2.0**-0.5, marks=pytest.mark.slow)]
+)
 def test_levels_are_cases(folder, factor):
     """Two steps stay two, if they are 1.41 times as long."""
     case = load_case(folder)

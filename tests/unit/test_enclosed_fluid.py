@@ -135,24 +135,27 @@ def test_accepted(name):
     assert [str(problem) for problem in check_meshes(load(RIGHT[name])).problems] == []
 
 
-def test_a_body_that_covers_the_cells_of_a_process(tmp_path):
-    """A block is lowered into a channel, in front of all cells of one of four processes: as on one."""
-    lowered = """\
-time: {step: 0.05, end: 0.5}
+@pytest.mark.parametrize(("processes", "width"), [(2, 2.63), pytest.param(4, 1.63, marks=pytest.mark.slow)])
+def test_a_body_that_covers_the_cells_of_a_process(tmp_path, processes, width):
+    """A block is lowered into a channel, in front of all cells of one of the processes: as on one."""
+    lowered = f"""\
+time: {{step: 0.05, end: 0.5}}
 fluid:
   density: 1
   viscosity: 0.05
   scheme: backward_euler
-  grid: {from: [0, 0], to: [4, 0.5], cells: [32, 4]}
-  patches: {o: {on: [x-, x+, y+], outflow: true}, w: {on: y-, slip: true}}
+  grid: {{from: [0, 0], to: [4, 0.5], cells: [32, 4]}}
+  patches: {{o: {{on: [x-, x+, y+], outflow: true}}, w: {{on: y-, slip: true}}}}
   bodies:
     a:
-      mesh: {shape: rectangle, size: [1.63, 2], cells: [4, 4], origin: [-0.3, 0.41]}
-      motion: {displacement: [0, -1.1*t]}
-probes: {v: {field: fluid, quantity: volume}}
-output: {fields_every: 0}
+      mesh: {{shape: rectangle, size: [{width}, 2], cells: [4, 4], origin: [-0.3, 0.41]}}
+      motion: {{displacement: [0, -1.1*t]}}
+probes: {{v: {{field: fluid, quantity: volume}}}}
+output: {{fields_every: 0}}
 """
     (tmp_path / "case.yaml").write_text(lowered)
-    run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=4)
+    run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=processes)
     assert run.returncode == 0, run.stdout + run.stderr
-    assert read_history(tmp_path / "out" / "history.csv")["v"][-1] == pytest.approx(1.335, rel=1e-12)
+    assert read_history(tmp_path / "out" / "history.csv")["v"][-1] == pytest.approx(
+        2.0 - 0.5 * (width - 0.3), rel=1e-12
+    )

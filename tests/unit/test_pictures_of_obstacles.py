@@ -96,8 +96,18 @@ def test_contact_pressure_is_drawn_beside_what_presses(tmp_path, monkeypatch):
     assert [(part.aside, part.values is None) for part in drawn] == [(True, True), (False, False)]
 
 
-@pytest.mark.parametrize(("shift", "half"), [(1.0, 1.0), (0.3, 1.7), (1.7, 0.3), (0.0, 2.0), (-0.5, 2.5)])
-@pytest.mark.parametrize("computed", [1.0, -1.0])
+PLACES = ((1.0, 1.0), (0.3, 1.7), (1.7, 0.3), (0.0, 2.0), (-0.5, 2.5))
+
+
+@pytest.mark.parametrize(
+    ("computed", "shift", "half"),
+    [
+        *((1.0, *place) for place in PLACES[:3]),
+        *((-1.0, *place) for place in PLACES[3:]),
+        *(pytest.param(1.0, *place, marks=pytest.mark.slow) for place in PLACES[3:]),
+        *(pytest.param(-1.0, *place, marks=pytest.mark.slow) for place in PLACES[:3]),
+    ],
+)
 def test_an_obstacle_across_a_plane_of_symmetry_has_two_sides(tmp_path, monkeypatch, shift, half, computed):
     """Those of the side that was computed; bodies may not be across."""
     seen = []

@@ -62,6 +62,7 @@ def test_who_waits_for_one_that_has_failed_is_ended(run, monkeypatch):
     assert run("works").returncode == 0
 
 
+@pytest.mark.slow
 def test_the_end_of_the_time_of_both(run):
     """It says where both were."""
     with pytest.raises(TimeoutExpired, match=r"(?s)(program\.py\", line 18.*){2}"):

@@ -32,7 +32,25 @@ fluid:
 """
 
 
-@pytest.mark.parametrize("folder", CASES, ids=lambda folder: folder.name)
+#: cases with the settings of another one
+ALIKE = (
+    "cylinder_2d2",
+    "csm2",
+    "csm3",
+    "fsi3",
+    "falling_rigid_sphere",
+    "torus_rough",
+    "torus_wall_fine",
+    "valve_thin",
+    "leaflet_pulsating",
+    "sealed_plate",
+)
+
+
+@pytest.mark.parametrize(
+    "folder",
+    [pytest.param(folder, id=folder.name, marks=pytest.mark.slow if folder.name in ALIKE else ()) for folder in CASES],
+)
 def test_twins_are_cases(folder):
     case = load_case(folder)
     found = twins(case)

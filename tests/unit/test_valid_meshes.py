@@ -313,6 +313,7 @@ def test_what_is_accepted_runs():
     assert run_case(load(CASE), load(CASE).folder / "out") == FINISHED
 
 
+@pytest.mark.slow
 def test_time():
     """Of 100,000 nodes; measured 0.5 s (hexahedra) and 2.7 s (tetrahedra)."""
     for cell, most in (("hex", 4.0), ("tet", 15.0)):

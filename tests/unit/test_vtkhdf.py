@@ -114,7 +114,9 @@ def contents(path):
     return found
 
 
-@pytest.mark.parametrize("last", [0, 1, 2, 3])
+@pytest.mark.parametrize(
+    "last", [0, pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
+)
 def test_a_resumed_run_leaves_the_same_numbers(tmp_path, last):
     write(VtkHdfWriter(tmp_path / "whole"), range(4))
     write(VtkHdfWriter(tmp_path / "resumed"), range(4))
