@@ -117,7 +117,7 @@ class Monolithic:
 
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
-        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.longest_step))
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.longest_step))
 
     def _take(self, t: float, dt: float) -> StepInfo:
         """A step from its predictor, or from the state before it where the predictor leads astray.

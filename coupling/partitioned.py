@@ -55,7 +55,7 @@ class Partitioned:
 
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
-        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.longest_step))
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.longest_step))
 
     def _start_again(self, t: float, dt: float) -> None:
         """Start anew after the step of an impulse; increments of other steps say nothing of this start."""

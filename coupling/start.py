@@ -48,8 +48,9 @@ def start_together(
 
     solve: solves a step of both fields that has begun; roughly: to a per cent, None: `solve`; with_solid: together.
     The initial state is kept in these cases: the solid has no inertia; the flow starts impulsively around elastic
-    bodies, which take the first step by backward Euler; the flow uses backward Euler, whose velocities are those of
-    the middle of a step, and does not start impulsively; a start step does not converge, with a note to the user.
+    bodies, which take the first step by backward Euler; the flow around elastic bodies uses backward Euler, whose
+    velocities are those of the middle of a step, and does not start impulsively; a start step does not converge, with
+    a note to the user.
     """
     if coupled.start is not None:
         flow, solid = coupled.start.flow, coupled.start.solid
@@ -94,7 +95,7 @@ def _start(
             flow.end_impulse(dt)
             interface.initialise()
             coupled.solid.load(np.zeros_like(velocity))
-        elif flow.accelerates:
+        elif flow.accelerates or solid.steps == 1:
             _share_acceleration(coupled, start, t, dt, velocity, solve, roughly)
         else:
             return True
@@ -135,6 +136,7 @@ def _share_acceleration(
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
     if start.solid.steps == 1:  # free bodies, which the flow may brake
         dt = lengths(dt, dt / max(1.0, _decay(coupled, start, t, dt, velocity, roughly)))[0]
+        coupled.longest_first = dt
     acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
     force = coupled.force()
     start.solid.end()
