@@ -56,7 +56,7 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
             case "fluid" if case.fluid is not None:
                 yield from _of_fluid(case, case.fluid, name, probe)
             case "rigid" if case.rigid is not None:
-                if probe.body not in case.rigid:
+                if probe.on is None and probe.body not in case.rigid:
                     hint = did_you_mean(probe.body or "", case.rigid)
                     yield keys, f"'{name}' is measured on a free body: name it as 'body'{hint}"
             case _:
@@ -97,7 +97,7 @@ def _of_structure(structure: StructureSection, name: str, probe: Probe) -> Itera
 def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, grid = ("probes", name), fluid.grid
     bodies = [*fluid.bodies, *case.elastic_bodies]
-    if "body" not in probe.measured.needs:
+    if "body" not in probe.measured.needs or probe.on is not None:
         if probe.body is not None:
             yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not measured on a body"
     elif probe.body is not None and probe.body not in bodies:

@@ -195,6 +195,19 @@ class RigidContact:
         given = near.in_frame(near.given) / self._moment.dt + self._of_all(near).motion(without) - touch.motion(without)
         return Closed(near, touch, self.z[self.active], self._moment, mass, given, force, gyroscopic)
 
+    @property
+    def given(self) -> list[str]:
+        """Names of the obstacles and walls."""
+        return list(dict.fromkeys(pair.other.name for pair in self.pairs if not isinstance(pair.other, int)))
+
+    def on_given(self, name: str) -> Array:
+        """Force [N] of all bodies on an obstacle or wall, averaged over the step, shape (dim,)."""
+        near, z = self.near[self.active], self.z[self.active]
+        number = np.searchsorted(self._starts, near.vertex % self._starts[-1], side="right") - 1
+        there = np.array([not isinstance(p.other, int) and p.other.name == name for p in self.pairs])[number]
+        forces = np.einsum("mde,md->me", near.frame, z)  # on what has the vertex
+        return np.asarray((forces * np.where(near.body[:, :1] < 0, 1.0, -1.0))[there].sum(axis=0))
+
     def _of_all(self, near: Near) -> Touch:
         """Relative motions by all unknowns, those that are held, too."""
         assert self._moment is not None
