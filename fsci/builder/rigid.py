@@ -132,11 +132,11 @@ def _whole(case: Case, bodies: RigidBodies, name: str) -> probes.Probe:
 
 def _on_given(case: Case, bodies: RigidBodies, name: str) -> probes.Probe:
     """Raises CaseError."""
-    on, contact = case.probes[name].on or "", bodies.contact
+    on, contact, body = case.probes[name].on or "", bodies.contact, case.probes[name].body
     names = [] if contact is None else contact.given
     if contact is None or on not in names:
         raise case.error(("probes", name, "on"), f"free bodies do not touch '{on}'{did_you_mean(on, names)}")
-    return probes.on_given(contact, on)
+    return probes.on_given(contact, on, None if body is None else _index(bodies, body))
 
 
 def _index(bodies: RigidBodies, name: str | None) -> int:

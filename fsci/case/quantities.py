@@ -127,8 +127,8 @@ _QUANTITIES = (
         "contact_force",
         _FORCE,
         "vector",
-        meaning="of free bodies on an obstacle, a given body or a closed patch, mean in the step; elastic bodies have "
-        "columns contact.PAIR",
+        meaning="of free bodies, or of one `body`, on an obstacle, a given body or a closed patch, mean in the step; "
+        "elastic bodies have columns contact.PAIR",
         rigid=("on",),
     ),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),

@@ -47,9 +47,9 @@ def of_body(bodies: RigidBodies, index: int, quantity: str) -> Probe:
     return probe
 
 
-def on_given(contact: RigidContact, name: str) -> Probe:
-    """Probe of the contact_force [N] of all free bodies on an obstacle or wall, averaged over the step."""
-    return lambda: _components(contact.on_given(name))
+def on_given(contact: RigidContact, name: str, body: int | None) -> Probe:
+    """Probe of the contact_force [N] on an obstacle or wall; see `RigidContact.on_given`."""
+    return lambda: _components(contact.on_given(name, body))
 
 
 def _components(values: Array) -> dict[str, float]:

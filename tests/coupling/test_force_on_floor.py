@@ -38,6 +38,8 @@ probes:
   floor: {quantity: contact_force, on: floor}
   table: {quantity: contact_force, on: table}
   sides: {quantity: contact_force, on: sides}
+  by_heavy: {quantity: contact_force, on: floor, body: heavy}
+  by_light: {quantity: contact_force, on: floor, body: light}
   wet_floor: {quantity: force, on: floor}
   wet_left: {quantity: force, on: sides}
 output: {fields_every: 0}
@@ -83,6 +85,8 @@ def test_floor_and_table_carry_what_the_fluid_does_not(tmp_path, rule, scheme):
         assert found[f"{probe}.y"] == pytest.approx(-found[f"contact.on_{body}.y"], rel=1e-12, abs=1e-12)
         assert found[f"{probe}.x"][-1] == pytest.approx(0.0, abs=1e-6 * abs(load))
     assert not found["sides.x"].any()
+    assert not found["by_light.y"].any()
+    assert np.array_equal(found["by_heavy.y"], found["floor.y"])
     assert found["wet_floor.y"][-1] == pytest.approx(-10.0 * 0.8 * 1.2, rel=1e-5)
 
 
@@ -110,18 +114,22 @@ def test_a_resumed_run_has_the_same_forces(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("on", "words"),
+    ("old", "new", "words"),
     [
-        ("flor", "free bodies do not touch 'flor'; did you mean 'floor'?"),
-        ("top", "free bodies do not touch 'top' (available: table, sides, floor)"),
+        ("on: floor", "on: flor", "22:40: there is no obstacle, given body or patch 'flor'; did you mean 'floor'?"),
+        ("on: floor", "on: light", "22:40: there is no obstacle, given body or patch 'light' (available: table, top, "),
+        ("on: floor", "on: top", "22:40: free bodies do not touch 'top' (available: table, sides, floor)"),
+        ("body: heavy", "body: heavi", "25:56: unknown free body 'heavi'; did you mean 'heavy'?"),
+        ("force, on: floor}", "force, on: floor, body: heavy}", "27:49: quantity 'force' of the fluid is not measured"),
     ],
 )
-def test_what_free_bodies_cannot_touch_has_no_force(tmp_path, on, words):
+def test_mistakes_are_located(tmp_path, old, new, words):
     text = DISCS.replace("RULE", "bdf2").replace("SCHEME", "monolithic")
-    (tmp_path / "case.yaml").write_text(text.replace("contact_force, on: floor", f"contact_force, on: {on}"))
+    start = text.index("wet_floor" if old.startswith("force") else "  by_heavy" if "body" in old else "  floor:")
+    (tmp_path / "case.yaml").write_text(text[:start] + text[start:].replace(old, new, 1))
     with pytest.raises(CaseError) as raised:
         build(load_case(tmp_path / "case.yaml"), MPI.COMM_SELF, Timer())
-    assert f"22:40: {words}" in str(raised.value)
+    assert words in str(raised.value)
 
 
 def test_without_contact_there_is_no_force(tmp_path):
