@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from itertools import product
 
 from fsci.case.case import Case
@@ -61,7 +61,7 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
                 yield from _of_none(case, name, probe)
 
 
-def _of_rigid(case: Case, rigid: Iterable[str], name: str, probe: Probe) -> Iterator[Mistake]:
+def _of_rigid(case: Case, rigid: Collection[str], name: str, probe: Probe) -> Iterator[Mistake]:
     keys: Keys = ("probes", name)
     if probe.on is None:
         if probe.body not in rigid:
