@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -38,6 +39,7 @@ class Coupled:
         self.flow, self.solid, self.start, self.walls = flow, solid, start, walls
         self.notes: list[str] = []  #: notes to the user on the start
         self._dt = 0.0  #: length of the present step [s]
+        self.longest_first = math.inf  #: longest part [s] of the first step, in which the flow may brake free bodies
         self.interface = Interface(solid, flow.times, dry_sides, layers)
         self.balance = Balance(flow, solid, self.interface)
         self.sentinel = InterfaceSentinel(self.balance, solid, steady=flow.steady)
@@ -51,6 +53,11 @@ class Coupled:
         self.flow.initialise(t, dt)
         self.flow.move(self.interface.move(self.interface.now), with_solid=with_solid)
         self.balance.start()
+
+    @property
+    def longest_step(self) -> float:
+        """[s]; longer ones are divided into parts."""
+        return min(self.flow.longest_step, self.longest_first)
 
     def begin_step(self, t: float, dt: float) -> None:
         """Set boundary values and loads to t + dt; both parts keep their state at t."""
@@ -76,6 +83,7 @@ class Coupled:
         self.solid.end_step()
         self.flow.end_step()
         self.balance.add_step(self._dt)
+        self.longest_first = math.inf
 
     def take_notes(self) -> tuple[str, ...]:
         """Notes to the user on this step; those on the start are returned once."""
@@ -93,6 +101,7 @@ class Coupled:
             "structure": self.solid.save(),
             "interface": self.interface.save(),
             "balance": self.balance.save(),
+            "longest_first": self.longest_first,
             **({} if self.walls is None else {"walls": self.walls.save()}),
         }
 
@@ -103,6 +112,7 @@ class Coupled:
         self.flow.restore(state["fluid"])
         self.interface.restore(state["interface"])
         self.balance.restore(state["balance"])
+        self.longest_first = state["longest_first"]
         if self.walls is not None:
             self.walls.end_restore()
 

@@ -38,7 +38,7 @@ from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import Numbering, distributed, from_entries, gather
 from solvers.algebra.sparse import Sparse
 from solvers.api import Array, FailureKind, NoResidual, State, StepFailed, StepInfo
-from solvers.newton import Tolerance, converge
+from solvers.newton import ENOUGH, Tolerance, converge
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,10 @@ class Monolithic:
         solid, flow = self.coupled.solid, self.coupled.flow
         # unsteady: the factors of the first iterate do not precondition the later ones well enough
         direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
-        krylov = Lagged(fresh=math.inf if flow.steady else 1)
+        # free bodies: forces are a small part of what the penalty of their surface has in the first residual, and a
+        # thousandth of it in their motion costs another iterate with a new cut
+        few = linear.FEW if len(solid.rigid_unknowns()) else 0
+        krylov = Lagged(fresh=math.inf if flow.steady else 1, few=few)
         return _Solvers(Numbering(self.comm, solid.size, flow.size), flow.renewals, direct, krylov)
 
     # ------------------------------------------------------------------------------------------------- steps
@@ -82,7 +85,7 @@ class Monolithic:
     def initialise(self, t: float, dt: float) -> None:
         """Set both parts to the first time t [s]; dt [s]: length of the first step."""
         self.coupled.initialise(t, dt, with_solid=True)
-        start_together(self.coupled, t, dt, self._solve_unpredicted, with_solid=True)
+        start_together(self.coupled, t, dt, self._solve_unpredicted, roughly=self._solve_linearised, with_solid=True)
 
     def _begin_system(self) -> None:
         """Discard derivatives and preconditioners of the last step."""
@@ -96,6 +99,13 @@ class Monolithic:
         self._begin_system()
         self._converge()
 
+    def _solve_linearised(self) -> None:
+        """One iteration: with free bodies its system is solved to the square of `ENOUGH`, see `_number_unknowns`."""
+        self._begin_system()
+        self.follow()
+        self.residual()
+        self.advance(reduction=ENOUGH)
+
     def _converge(self) -> StepInfo:
         """To the tolerance; from there once more, if the flow lets go what it has held on the way."""
         info = converge(self, self.tolerance)
@@ -107,7 +117,7 @@ class Monolithic:
 
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
-        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.longest_step))
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.longest_step))
 
     def _take(self, t: float, dt: float) -> StepInfo:
         """A step from its predictor, or from the state before it where the predictor leads astray.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from coupling.start import start_again, start_together
 from coupling.wall_passed import WallPassed
 from solvers.api import Array, FailureKind, State, StepFailed, StepInfo
 from solvers.counted import counted
+
+#: Relative error of start steps that only tell how soon the flow brakes a body: parts of the first step are halves.
+ROUGH = 1e-2
 
 
 @dataclass(frozen=True)
@@ -46,12 +50,12 @@ class Partitioned:
     def initialise(self, t: float, dt: float) -> None:
         """Set both fields to the first time t [s]; dt [s]: length of the first step."""
         self.coupled.initialise(t, dt)
-        start_together(self.coupled, t, dt, self._iterate)
+        start_together(self.coupled, t, dt, self._iterate, roughly=partial(self._iterate, relative=ROUGH))
         self.accelerator.forget()
 
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
-        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.longest_step))
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.longest_step))
 
     def _start_again(self, t: float, dt: float) -> None:
         """Start anew after the step of an impulse; increments of other steps say nothing of this start."""
@@ -81,8 +85,12 @@ class Partitioned:
         numbers = {"coupling.newton": float(newton), **coupled.balance.numbers(), **coupled.solid.numbers()}
         return StepInfo(len(history), tuple(history), numbers, coupled.take_notes())
 
-    def _iterate(self) -> tuple[list[float], int]:
-        """Iterate to the tolerance. Returns (residuals [m], Newton iterations of both fields). Raises StepFailed."""
+    def _iterate(self, *, relative: float | None = None) -> tuple[list[float], int]:
+        """Iterate to the tolerance. Returns (residuals [m], Newton iterations of both fields). Raises StepFailed.
+
+        relative: another one than that of the scheme.
+        """
+        relative = self.tolerance.relative if relative is None else relative
         coupled, interface = self.coupled, self.coupled.interface
         self.accelerator.begin_step()
         d, levels = interface.displacement(), np.zeros(self._pockets)
@@ -106,7 +114,7 @@ class Partitioned:
             found = interface.displacement()
             residual = max(_mean((found - d)[~apart]), float(np.abs(squeezed).max(initial=0.0)))
             history.append(residual)
-            if residual <= self._small(found, apart):
+            if residual <= self._small(found, apart, relative):
                 if not coupled.flow.release():
                     return history, newton
                 self.accelerator.forget()
@@ -142,7 +150,7 @@ class Partitioned:
                 coupled.flow.add_levels(levels - before[d.size :])
             last = now
 
-    def _small(self, found: Array, apart: NDArray[np.bool_]) -> float:
+    def _small(self, found: Array, apart: NDArray[np.bool_], relative: float) -> float:
         """Tolerance [m], at least a few rounding errors of positions: bodies may move by less in a step.
 
         apart: mask of the vertices of surfaces outside of the flow, however far they move.
@@ -150,7 +158,7 @@ class Partitioned:
         interface = self.coupled.interface
         moved = _mean((found - interface.begun)[~apart])
         rounding = 4.0 * np.finfo(float).eps * _mean((interface.points + found)[~apart])
-        return max(self.tolerance.relative * moved, self.tolerance.absolute, float(rounding))
+        return max(relative * moved, self.tolerance.absolute, float(rounding))
 
     def save(self) -> State:
         return {**self.coupled.save(), "accelerator": self.accelerator.save(), "pockets": self._pockets}

@@ -21,7 +21,8 @@ from coupling.divided import lengths
 from coupling.ports import Start
 from solvers.api import Array, StepFailed
 
-#: Way in the first step, in cells, below which a body counts as at rest: its acceleration may be rounding.
+#: Way in the first step, in cells, below which a body counts as at rest: its acceleration may be rounding. From 1e-9 to
+#: 1e-3 discs of the density of the fluid and of twice that start alike; less than this way only the place can be wrong.
 REST = 1e-6
 
 #: Note for the user.
@@ -36,19 +37,26 @@ NO_IMPULSE = (
 
 
 def start_together(
-    coupled: Coupled, t: float, dt: float, solve: Callable[[], object], *, with_solid: bool = False
+    coupled: Coupled,
+    t: float,
+    dt: float,
+    solve: Callable[[], object],
+    *,
+    roughly: Callable[[], object] | None = None,
+    with_solid: bool = False,
 ) -> None:
     """Compute the state from which the first step of length dt [s] starts (collective).
 
-    solve: solves a step of both fields that has begun; with_solid: as one system.
+    solve: solves a step of both fields that has begun; roughly: to a per cent, None: `solve`; with_solid: together.
     The initial state is kept in these cases: the solid has no inertia; the flow starts impulsively around elastic
-    bodies, which take the first step by backward Euler; the flow uses backward Euler, whose velocities are those of
-    the middle of a step, and does not start impulsively; a start step does not converge, with a note to the user.
+    bodies, which take the first step by backward Euler; the flow around elastic bodies uses backward Euler, whose
+    velocities are those of the middle of a step, and does not start impulsively; a start step does not converge, with
+    a note to the user.
     """
     if coupled.start is not None:
         flow, solid = coupled.start.flow, coupled.start.solid
         jump = flow.jump(coupled.interface.at_start(solid.velocity()), solid.gained(t, dt))
-        _start(coupled, coupled.start, t, dt, solve, with_solid=with_solid, jump=jump)
+        _start(coupled, coupled.start, t, dt, solve, roughly or solve, with_solid=with_solid, jump=jump)
 
 
 def start_again(
@@ -58,7 +66,7 @@ def start_again(
     assert coupled.start is not None
     solid = coupled.start.solid
     solid.begin()
-    if not _start(coupled, coupled.start, t, dt, solve, with_solid=with_solid, jump=0.0):
+    if not _start(coupled, coupled.start, t, dt, solve, solve, with_solid=with_solid, jump=0.0):
         solid.take_impulse(lambda: dt, math.inf)  # in one more step: its acceleration is that of the impulse still
 
 
@@ -68,6 +76,7 @@ def _start(
     t: float,
     dt: float,
     solve: Callable[[], object],
+    roughly: Callable[[], object],
     *,
     with_solid: bool,
     jump: float,
@@ -87,8 +96,8 @@ def _start(
             flow.end_impulse(dt)
             interface.initialise()
             coupled.solid.load(np.zeros_like(velocity))
-        elif flow.accelerates:
-            _share_acceleration(coupled, start, t, dt, velocity, solve)
+        elif flow.accelerates or solid.steps == 1:
+            _share_acceleration(coupled, start, t, dt, velocity, solve, roughly)
         else:
             return True
     except StepFailed as failure:
@@ -113,23 +122,23 @@ def _impulse(
 
 
 def _share_acceleration(
-    coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, solve: Callable[[], object]
+    coupled: Coupled,
+    start: Start,
+    t: float,
+    dt: float,
+    velocity: Array,
+    solve: Callable[[], object],
+    roughly: Callable[[], object],
 ) -> None:
     """Set accelerations and the flow before the start; velocity: of the vertices [m/s]."""
     interface = coupled.interface
     moved = start.solid.steps * dt**2 * start.solid.acceleration()
     if moved > start.flow.smallest_cell:
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
-    initial = coupled.save() if start.solid.steps == 1 else None  # free bodies, which the flow may brake
-    braked = None if initial is None else _braked(coupled, start, t, dt, velocity, solve)
-    if initial is not None:
-        coupled.restore(initial)
+    if start.solid.steps == 1:  # free bodies, which the flow may brake
+        dt = lengths(dt, dt / max(1.0, _decay(coupled, start, t, dt, velocity, roughly)))[0]
+        coupled.longest_first = dt
     acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
-    decay = 0.0 if braked is None else _decay(coupled, start, acceleration, braked, dt)
-    if initial is not None and decay > 1.0:
-        coupled.restore(initial)
-        dt = lengths(dt, dt / decay)[0]
-        acceleration = _acceleration(coupled, start, t, dt, start.flow.share * dt, velocity, solve)
     force = coupled.force()
     start.solid.end()
     interface.end_start(dt, velocity, acceleration)
@@ -153,25 +162,25 @@ def _acceleration(
     return (interface.displacement() - before) / dt**2
 
 
-def _braked(
-    coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, solve: Callable[[], object]
-) -> Array | None:
-    """The acceleration [m/s^2] of the vertices in a step dt of the flow, None without a solution."""
-    try:
-        return _acceleration(coupled, start, t, dt, dt, velocity, solve)
-    except StepFailed:
-        return None
+def _decay(
+    coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, roughly: Callable[[], object]
+) -> float:
+    """L dt of the body that the flow brakes most, by the rate L; zero if it is not found. The state is kept.
 
-
-def _decay(coupled: Coupled, start: Start, acceleration: Array, braked: Array, dt: float) -> float:
-    """L dt of the body that the flow brakes most, by the rate L.
-
-    Its acceleration is a / (1 + L k) in a step k of backward Euler: `braked` in k = dt, and `acceleration` in one that
-    is short. A first step should not be longer than 1 / L.
+    Its acceleration is a / (1 + L k) in a step k of backward Euler of the flow: `late` in k = dt, and `soon` in one
+    that is short. A first step should not be longer than 1 / L.
     """
+    initial, accelerations = coupled.save(), []
+    for k in (start.flow.share * dt, dt):
+        try:
+            accelerations.append(_acceleration(coupled, start, t, dt, k, velocity, roughly))
+        except StepFailed:
+            return 0.0
+        finally:
+            coupled.restore(initial)
     soon, late = (
         [float(np.linalg.norm(motion.v, axis=1).max()) for motion in coupled.interface.at_start(a).values()]
-        for a in (acceleration, braked)
+        for a in accelerations
     )
     least = REST * start.flow.smallest_cell / dt**2
     return max((a / b - 1.0 for a, b in zip(soon, late, strict=True) if min(a, b) > least), default=0.0)

@@ -204,6 +204,10 @@ def _force(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     return forces.probe(settings.quantity, settings.body, settings.about)
 
 
+def _force_on_patch(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    return probes.force_on_patch(forces.fluid, case.probes[name].on or "")
+
+
 def _coefficient(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
     settings = case.probes[name]
     assert settings.reference is not None
@@ -227,6 +231,7 @@ FLUID_PROBES: Table[probes.Forces] = {
     ("pressure", ""): _extreme,
     **{("speed", place): _place_of_extreme for place in ("box", "")},
     ("force", ""): _force,
+    ("force", "on"): _force_on_patch,
     ("moment", ""): _force,
     ("power", ""): _force,
     ("drag_coefficient", ""): _coefficient,

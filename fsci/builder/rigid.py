@@ -14,6 +14,7 @@ from fsci.builder.fluid import build_rigid_bodies, read_surface
 from fsci.builder.rigid_contact import build_rigid_contact
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
+from fsci.case.errors import did_you_mean
 from fsci.case.free_body import HELD, FreeMotion, PointSpringSection, RigidDynamics, RigidLoadSection
 from fsci.case.values import value_of
 from fsci.expression import Expression
@@ -129,6 +130,15 @@ def _whole(case: Case, bodies: RigidBodies, name: str) -> probes.Probe:
     return probes.of_body(bodies, _index(bodies, settings.body), settings.quantity)
 
 
+def _on_given(case: Case, bodies: RigidBodies, name: str) -> probes.Probe:
+    """Raises CaseError."""
+    on, contact, body = case.probes[name].on or "", bodies.contact, case.probes[name].body
+    names = [] if contact is None else contact.given
+    if contact is None or on not in names:
+        raise case.error(("probes", name, "on"), f"free bodies do not touch '{on}'{did_you_mean(on, names)}")
+    return probes.on_given(contact, on, None if body is None else _index(bodies, body))
+
+
 def _index(bodies: RigidBodies, name: str | None) -> int:
     return [body.name for body in bodies.bodies].index(name or "")
 
@@ -141,4 +151,5 @@ RIGID_PROBES: Table[RigidBodies] = {
     ("centre", ""): _whole,
     ("momentum", ""): _whole,
     ("angular_momentum", ""): _whole,
+    ("contact_force", "on"): _on_given,
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import product
 
 from fsci.case.case import Case
@@ -56,11 +56,25 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
             case "fluid" if case.fluid is not None:
                 yield from _of_fluid(case, case.fluid, name, probe)
             case "rigid" if case.rigid is not None:
-                if probe.body not in case.rigid:
-                    hint = did_you_mean(probe.body or "", case.rigid)
-                    yield keys, f"'{name}' is measured on a free body: name it as 'body'{hint}"
+                yield from _of_rigid(case, case.rigid, name, probe)
             case _:
                 yield from _of_none(case, name, probe)
+
+
+def _of_rigid(case: Case, rigid: Collection[str], name: str, probe: Probe) -> Iterator[Mistake]:
+    keys: Keys = ("probes", name)
+    if probe.on is None:
+        if probe.body not in rigid:
+            hint = did_you_mean(probe.body or "", rigid)
+            yield keys, f"'{name}' is measured on a free body: name it as 'body'{hint}"
+        return
+    names = [*(() if case.contact is None else case.contact.obstacles)]
+    names += [*case.fluid.bodies, *case.fluid.patches] if case.fluid is not None else []
+    given = [one for one in names if one not in rigid]
+    if probe.on not in given:
+        yield (*keys, "on"), f"there is no obstacle, given body or patch '{probe.on}'{did_you_mean(probe.on, given)}"
+    if probe.body is not None and probe.body not in rigid:
+        yield (*keys, "body"), f"unknown free body '{probe.body}'{did_you_mean(probe.body, rigid)}"
 
 
 def _of_none(case: Case, name: str, probe: Probe) -> Iterator[Mistake]:
@@ -97,7 +111,7 @@ def _of_structure(structure: StructureSection, name: str, probe: Probe) -> Itera
 def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, grid = ("probes", name), fluid.grid
     bodies = [*fluid.bodies, *case.elastic_bodies]
-    if "body" not in probe.measured.needs:
+    if "body" not in probe.measured.needs or probe.on is not None:
         if probe.body is not None:
             yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not measured on a body"
     elif probe.body is not None and probe.body not in bodies:

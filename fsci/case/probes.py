@@ -126,6 +126,7 @@ column NAME. In 2D everything is per unit of depth.
         possible = [
             words for name, words in LOCATIONS.items() if any(name in self.measured.locations(f) for f in FIELDS)
         ]
+        possible += ["a 'body'"] if possible and "body" in self.measured.needs else []
         whole = "body" if self.measured.structure or "body" in self.measured.needs else "fluid"
         whole = f"is measured on the whole {whole}: remove 'at' and 'on'"
         wanted = f"needs {' or '.join(possible)}" if possible else whole

@@ -20,6 +20,9 @@ LOCATIONS = {
 }
 WHOLE = ""  #: none of them: a body, or all fluid
 
+#: What `on` names in a field.
+SURFACES = {"structure": "a surface", "fluid": "a patch", "rigid": "what free bodies touch"}
+
 ENERGIES = ("kinetic", "internal", "work", "total")
 
 
@@ -119,7 +122,15 @@ _QUANTITIES = (
         ("through",),
         meaning="per volume, of the `rate` of a periodic patch: the mean pressure falls by as much per length",
     ),
-    Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
+    Quantity("force", _FORCE, "vector", (), ("on", WHOLE), ("body",), "of the fluid on the `body`, or on the patch"),
+    Quantity(
+        "contact_force",
+        _FORCE,
+        "vector",
+        meaning="of free bodies, or of one `body`, on an obstacle, a given body or a closed patch, mean in the step; "
+        "elastic bodies have columns contact.PAIR",
+        rigid=("on",),
+    ),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),
     Quantity("power", _POWER, "one", (), (WHOLE,), ("body",), "of that force, with the velocity of its surface"),
     Quantity("drag_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
@@ -138,7 +149,7 @@ def described(field: Field) -> str:
 def _lines(field: Field) -> Iterator[str]:
     words = {
         "at": "with `at`, at a point",
-        "on": f"with `on`, on a {'surface' if field == 'structure' else 'patch'}",
+        "on": f"with `on`, on {SURFACES[field]}",
         "pair": "with `pair`, of a contact pair",
         "through": "with `through`, through a patch",
         "plane": "with `plane`, through the part of a plane, in 2D of a line, that is in the fluid",

@@ -18,8 +18,9 @@ class Lagged:
     that resumed runs give the same results.
     """
 
-    def __init__(self, *, fresh: float = 1, patience: float = 2.0):
-        self.fresh, self.patience = fresh, patience
+    def __init__(self, *, fresh: float = 1, patience: float = 2.0, few: int = 0):
+        """few: see `linear.solve`."""
+        self.fresh, self.patience, self.few = fresh, patience, few
         self.made = 0  #: count of preconditioners in this step
         self._kept: tuple[PETSc.KSP, PETSc.Mat, float] | None = None  # with its matrix and iterations per digit
 
@@ -37,13 +38,12 @@ class Lagged:
         if self.patience < math.inf:
             ksp.setTolerances(max_it=min(most, math.ceil(self.patience * first * digits(ksp, reduction)) + linear.FEW))
         try:
-            linear.solve(ksp, matrix, b, x, made_of, reduction=reduction, few=0)
+            iterations, solved = linear.solve(ksp, matrix, b, x, made_of, reduction=reduction, few=self.few)
         except linear.LinearSolveFailed:
             return None
         finally:
             ksp.setTolerances(max_it=most)
-        iterations = int(ksp.getIterationNumber())
-        if iterations / digits(ksp, reduction) <= self.patience * first:
+        if iterations / digits(ksp, solved) <= self.patience * first:
             self._kept = kept
         return iterations
 
@@ -61,11 +61,10 @@ class Lagged:
 
         entries: the matrix with its entries, if `matrix` has products with vectors alone.
         """
-        linear.solve(ksp, matrix, b, x, entries, reduction=reduction, few=0)
+        iterations, solved = linear.solve(ksp, matrix, b, x, entries, reduction=reduction, few=self.few)
         ksp.getPC().setReusePreconditioner(True)  # also when the matrix changes
         self.made += 1
-        iterations = int(ksp.getIterationNumber())
-        self._kept = ksp, entries or matrix, iterations / digits(ksp, reduction)
+        self._kept = ksp, entries or matrix, iterations / digits(ksp, solved)
         return iterations
 
 

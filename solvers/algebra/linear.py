@@ -358,8 +358,8 @@ def solve(
     reduction: float = 0.0,
     squared: bool = False,
     few: int = FEW,
-) -> None:
-    """Solve matrix x = b (collective). Raises LinearSolveFailed.
+) -> tuple[int, float]:
+    """Solve matrix x = b (collective); returns iterations and the reduction reached. Raises LinearSolveFailed.
 
     preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`. reduction: of the
     residual that is good enough for a Krylov method. Where that costs `few` iterations, or if `squared`, it is solved
@@ -370,12 +370,13 @@ def solve(
     for comm in (ksp.comm, matrix.comm):
         free_deleted(comm)
     ksp.setOperators(matrix, preconditioned_by)
-    tolerance = ksp.getTolerances()[0]
+    tolerance, before = ksp.getTolerances()[0], 0
     if reduction > tolerance and ksp.getType() != PETSc.KSP.Type.PREONLY:
         exact = max(tolerance, reduction**2)
         ksp.setTolerances(rtol=exact if squared else reduction)
         unlocked.solve(ksp, b, x)
         if not squared and ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= few:
+            before, reduction = ksp.getIterationNumber(), exact
             ksp.setTolerances(rtol=exact)
             ksp.setInitialGuessNonzero(True)
             unlocked.solve(ksp, b, x)
@@ -391,6 +392,7 @@ def solve(
         raise LinearSolveFailed(
             f"the linear solver stalled after {counted(ksp.getIterationNumber(), 'iteration')} ({reason_of(ksp)})"
         )
+    return before + int(ksp.getIterationNumber()), reduction
 
 
 def reason_of(ksp: PETSc.KSP) -> str:

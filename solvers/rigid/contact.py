@@ -195,6 +195,22 @@ class RigidContact:
         given = near.in_frame(near.given) / self._moment.dt + self._of_all(near).motion(without) - touch.motion(without)
         return Closed(near, touch, self.z[self.active], self._moment, mass, given, force, gyroscopic)
 
+    @property
+    def given(self) -> list[str]:
+        """Names of the obstacles and walls."""
+        return list(dict.fromkeys(pair.other.name for pair in self.pairs if not isinstance(pair.other, int)))
+
+    def on_given(self, name: str, body: int | None = None) -> Array:
+        """Force [N] on an obstacle or wall, averaged over the step, shape (dim,); body: index, None: of all bodies."""
+        near, z = self.near[self.active], self.z[self.active]
+        number = np.searchsorted(self._starts, near.vertex % self._starts[-1], side="right") - 1
+        counts = [
+            not isinstance(pair.other, int) and pair.other.name == name and body in (None, pair.body)
+            for pair in self.pairs
+        ]
+        forces = np.einsum("mde,md->me", near.frame, z)  # on what has the vertex
+        return np.asarray((forces * np.where(near.body[:, :1] < 0, 1.0, -1.0))[np.array(counts)[number]].sum(axis=0))
+
     def _of_all(self, near: Near) -> Touch:
         """Relative motions by all unknowns, those that are held, too."""
         assert self._moment is not None

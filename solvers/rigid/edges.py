@@ -126,16 +126,16 @@ def crossings(one: PlacedEdges, other: PlacedEdges, margin: float, deepest: floa
     """
     first, second = _near_each_other(one, other, max(margin, deepest))
     along, along_other = one.along[first], other.along[second]
-    normal, way = np.cross(along, along_other), other.first[second] - one.first[first]
-    square = np.einsum("md,md->m", normal, normal)
+    way, cosine = other.first[second] - one.first[first], np.einsum("md,md->m", along, along_other)
+    on_one, on_other = (np.einsum("md,md->m", way, some) for some in (along, along_other))
+    square = 1.0 - cosine**2
     crossing = square > SINE**2
     square = np.where(crossing, square, 1.0)
-    share = np.einsum("md,md->m", np.cross(way, along_other), normal) / square
+    share, share_other = (on_one - cosine * on_other) / square, (cosine * on_one - on_other) / square
     crossing &= (share > 0.0) & (share < one.length[first])
-    share_other = np.einsum("md,md->m", np.cross(way, along), normal) / square
     crossing &= (share_other > 0.0) & (share_other < other.length[second])
-    one, other, share = one[first[crossing]], other[second[crossing]], share[crossing]
-    normal, way = normal[crossing] / np.sqrt(square[crossing, None]), way[crossing]
+    one, other, share, way = one[first[crossing]], other[second[crossing]], share[crossing], way[crossing]
+    normal = _unit(np.cross(one.along, other.along))
     normal *= np.where(np.einsum("md,md->m", normal, other.outward - one.outward) < 0.0, -1.0, 1.0)[:, None]
     gap = -np.einsum("md,md->m", way, normal)
     near = (gap < margin) & (gap > -deepest) & (np.abs(gap) < np.maximum(one.length, other.length))

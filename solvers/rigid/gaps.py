@@ -49,21 +49,42 @@ def gaps(x: Array, corners: Array, outward: Array | None = None, within: float =
     came through a facet that faces it, though it may be nearer to another one, at the side.
     """
     point, facet = _candidates(x, corners, within)
-    normals = unit_normals(corners)
+    normals, rounding = unit_normals(corners), RESOLVED * _extent(corners)
+    found = Gaps(np.full(len(x), np.inf), np.zeros_like(x), np.zeros(len(x), dtype=np.int64))
+    _set_nearest(found, x, corners, normals, (point, facet), within, rounding)
+    if outward is None:
+        return found
+    entered = found.gap[point] <= rounding
+    point, facet = point[entered], facet[entered]
+    facing = np.einsum("pd,pd->p", outward[point], normals[facet]) < 0.0
+    _set_nearest(found, x, corners, normals, (point[facing], facet[facing]), within, rounding)
+    return found
+
+
+def _set_nearest(
+    found: Gaps,
+    x: Array,
+    corners: Array,
+    normals: Array,
+    pairs: tuple[NDArray[np.int64], NDArray[np.int64]],
+    within: float,
+    rounding: float,
+) -> None:
+    """Set the gaps of points that are nearer than `within` to facets of their pairs, which are ordered by points."""
+    point, facet = pairs
+    if len(point) == 0:
+        return
+    middles = corners.mean(axis=1)
+    radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1) + rounding
+    far = np.linalg.norm(x[point] - middles[facet], axis=1)
+    new = np.diff(point, prepend=-1) > 0
+    # a facet is no nearer than its middle less its radius, and the nearest one no farther than the nearest middle
+    kept = far - radii[facet] <= np.minimum.reduceat(far, np.flatnonzero(new))[np.cumsum(new) - 1]
+    point, facet = point[kept], facet[kept]
     away = x[point] - feet(x[point], corners[facet])
     distances = np.linalg.norm(away, axis=1)
     near = distances < within
-    point, facet, away, distances = point[near], facet[near], away[near], distances[near]
-    rounding = RESOLVED * _extent(corners)
-    found = Gaps(np.full(len(x), np.inf), np.zeros_like(x), np.zeros(len(x), dtype=np.int64))
-    _nearest(found, (point, facet), away, distances, normals, rounding)
-    if outward is None:
-        return found
-    facing = np.einsum("pd,pd->p", outward[point], normals[facet]) < 0.0
-    facing &= found.gap[point] <= rounding
-    chosen = point[facing], facet[facing]
-    _nearest(found, chosen, away[facing], distances[facing], normals, rounding)
-    return found
+    _nearest(found, (point[near], facet[near]), away[near], distances[near], normals, rounding)
 
 
 def _candidates(x: Array, corners: Array, within: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

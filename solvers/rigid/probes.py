@@ -8,6 +8,7 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.rigid import motion
+from solvers.rigid.contact import RigidContact
 from solvers.rigid.field import RigidBodies
 
 Probe = Callable[[], dict[str, float]]
@@ -44,6 +45,11 @@ def of_body(bodies: RigidBodies, index: int, quantity: str) -> Probe:
         return _components((centre if quantity == "centre" else momentum)[: bodies.dim])
 
     return probe
+
+
+def on_given(contact: RigidContact, name: str, body: int | None) -> Probe:
+    """Probe of the contact_force [N] on an obstacle or wall; see `RigidContact.on_given`."""
+    return lambda: _components(contact.on_given(name, body))
 
 
 def _components(values: Array) -> dict[str, float]:

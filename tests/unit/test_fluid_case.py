@@ -160,7 +160,7 @@ MISTAKES = [
     (
         "{quantity: force}",
         "{quantity: force, at: [1, 1]}",
-        "16:32: quantity 'force' is measured on the whole body: remove 'at' and 'on'",
+        "16:32: quantity 'force' needs 'on: SURFACE' or a 'body'",
         "[1, 1]",
     ),
     (

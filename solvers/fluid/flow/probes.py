@@ -179,6 +179,36 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
     return probe
 
 
+def force_on_patch(fluid: Fluid, patch: str) -> Probe:
+    """Probe of the force [N] of the fluid on a patch, int p n - 2 mu eps(u) n over its wet part, n out of the box.
+
+    (collective)
+    """
+
+    def integrals() -> list[fem.Integral]:
+        domain = fluid.grid.domain
+        u, p = fluid.unknowns.parts(fluid.system.flow)
+        n = ufl.FacetNormal(domain.mesh)
+        force = p * n - ufl.dot(forms.viscous_stress(fluid.system.terms, u), n)
+        ds = fem.measure(domain, "ds", fluid.unknowns.degree)
+        return [fem.Integral(domain, force[axis] * ds) for axis in range(fluid.dim)]
+
+    latest = renewed(fluid, integrals)
+
+    def on_covered(part: CoveredFaces) -> Array:
+        mu = fluid.system.viscosity.of(part.cells)
+        viscous = part.viscous_traction(fluid.flow, mu if isinstance(mu, float) else mu[:, None])
+        traction = part.along_normal(part.pressure(fluid.flow)) - viscous
+        return np.asarray(np.einsum("cq,cqi->i", part.weights, traction))
+
+    def probe() -> dict[str, float]:
+        facets, covered = _facets(fluid, [patch])
+        whole = np.array([fem.assemble_scalar(form.on(exterior_facet=facets), fluid.comm) for form in latest()])
+        return _components(whole + fluid.comm.allreduce(sum((on_covered(p) for p in covered), np.zeros(fluid.dim))))
+
+    return probe
+
+
 def of_outlet(fluid: Fluid, patch: str) -> Probe:
     """Probe of the pressure [Pa] that the law of an outlet gives for its flow rate (collective)."""
     number = list(outlet_laws(fluid.patches)).index(patch)

@@ -45,6 +45,17 @@ class CoveredFaces:
         shapes, _ = fem.tabulate_lagrange(self.grid.domain, 1, self.reference)
         return values[self.unknowns.cell_pressure[self.cells]] @ shapes.T
 
+    def viscous_traction(self, values: Array, mu: float | Array) -> Array:
+        """2 mu eps(u) n [Pa] at the points, n out of the box, shape (cells, points, dim).
+
+        values: at local dofs; mu [Pa s], shape (cells, 1) if it varies.
+        """
+        _, slopes = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
+        u = values[self.unknowns.cell_velocity[self.cells]]
+        gradient = np.einsum("qaj,cai->cqij", slopes, u) / self.grid.sizes[self.cells][:, None, None, :]
+        both = gradient[..., self.axis] + gradient[..., self.axis, :]  # du_i/dn + du_n/dx_i
+        return np.asarray((1.0 if self.side else -1.0) * np.asarray(mu)[..., None] * both)
+
     def outward(self, vectors: Array) -> Array:
         """Components of vectors along the outward normal of the box."""
         normal: Array = vectors[..., self.axis]
