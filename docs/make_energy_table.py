@@ -63,8 +63,8 @@ SMOOTH_LOAD = {
 }
 
 
-#: The flow begins at rest, and a load bends the flag. The case's gust begins across a flag at rest: its impulse, over two
-#: steps, is a tenth to a third of the energy exchanged, however short they are.
+#: The flow begins at rest, and a load bends the flag. The case's gust begins across a flag at rest: what its impulse
+#: exchanges in two steps is wrong by a third, however short they are.
 SMOOTH_FLAG = {
     "time.end": 0.2,
     "fluid.initial_velocity": [0, 0],
