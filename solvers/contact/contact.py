@@ -252,7 +252,7 @@ class Contact:
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
             shares=np.zeros((len(which), len(self.pairs))) if slip is None else slip.shares[which],
             stuck=self.active_set.stuck[which],
-            free=slips_freely(self._unheld, self.terms.D_of_pair * self._covers, self.active_set.status)[which],
+            free=slips_freely(self._unheld, self.terms.D_of_pair, self._covers, self.active_set.status)[which],
             c_n=self.c_n * stiffness,
             c_t=self.c_n * stiffness,
             touching=self._tolerance[which],

@@ -33,13 +33,18 @@ def nearest_gaps(bodies: Sequence[Sequence[int]], of_pair: Array, mean_gap: Arra
     return found
 
 
-def slips_freely(bodies: Sequence[Sequence[int]], of_pair: Array, status: Statuses) -> NDArray[np.bool_]:
+def slips_freely(
+    bodies: Sequence[Sequence[int]], of_pair: Array, covered: NDArray[np.bool_], status: Statuses
+) -> NDArray[np.bool_]:
     """Mask of the multipliers that slip on bodies which no node holds by sticking, shape (C,).
 
-    bodies, of_pair: as above. A body is held if it sticks to one that is, or to one that is not among these.
+    bodies, of_pair: as above; covered: mask of the multipliers with a constraint, (C,). A body is held if it sticks to
+    one that is, or to one that is not among these.
     """
-    covers, sticks = of_pair > 0.0, status == STICK
-    stuck = (covers & sticks).any(axis=1)
+    if not bodies:
+        return np.zeros(len(status), dtype=bool)
+    covers = (of_pair > 0.0) & covered
+    stuck = (covers & (status == STICK)).any(axis=1)
     free, before = [set(pairs) for pairs in bodies], -1
     while len(free) != before:
         before = len(free)

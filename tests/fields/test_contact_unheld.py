@@ -1,6 +1,7 @@
 """Bodies that friction alone holds: iterates in which all nodes slip leave them without stiffness."""
 
 import numpy as np
+import pytest
 from programs import fsci
 
 from fsci.running.history import read_history
@@ -63,16 +64,26 @@ def test_a_stack_does_not_depend_on_what_stands_beside(tmp_path):
     np.testing.assert_allclose(top_x[sliding], -0.2 * top_y[sliding], rtol=3e-3)  # normals of deformed surfaces
 
 
+@pytest.mark.slow
+def test_a_stack_with_half_the_step_and_on_two_processes(tmp_path):
+    """Once both joints slide, the force does not depend on the steps before."""
+    alone = dragged(tmp_path / "one", 100)
+    np.testing.assert_allclose(dragged(tmp_path / "two", 100, processes=2), alone, rtol=1e-8, atol=1e-8)
+    halved = dragged(tmp_path / "half", 100, text=STACK.replace("step: 0.25", "step: 0.125"))
+    np.testing.assert_allclose(halved[:, halved[0] > 1.1], alone[:, alone[0] > 1.1], rtol=1e-8, atol=1e-8)
+
+
 def test_bodies_that_a_node_holds_do_not_slip_freely():
     """A chain of two loose bodies on a held one: pair 0 holds the first, pair 1 joins them, pair 2 the second alone."""
     bodies, of_pair = [[0, 1], [1, 2]], np.eye(3)
 
     def found(*status):
-        return slips_freely(bodies, of_pair, np.array(status, dtype=np.int8)).tolist()
+        return slips_freely(bodies, of_pair, np.ones(3, dtype=bool), np.array(status, dtype=np.int8)).tolist()
 
     assert found(STICK, STICK, SLIP) == [False, False, False]
     assert found(STICK, SLIP, SLIP) == [False, True, True]
     assert found(SLIP, STICK, SLIP) == [True, False, True]
     assert found(SLIP, SLIP, OPEN) == [True, True, False]
     assert found(OPEN, SLIP, STICK) == [False, True, False]
-    assert slips_freely([], of_pair, np.full(3, SLIP, dtype=np.int8)).tolist() == [False] * 3
+    assert slips_freely([], of_pair, np.ones(3, dtype=bool), np.full(3, SLIP)).tolist() == [False] * 3
+    assert slips_freely(bodies, of_pair, np.zeros(3, dtype=bool), np.full(3, SLIP)).tolist() == [False] * 3
