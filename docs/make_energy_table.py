@@ -63,6 +63,16 @@ SMOOTH_LOAD = {
 }
 
 
+#: The flow begins at rest, and a load bends the flag. The case's gust begins across a flag at rest: what its impulse
+#: exchanges in two steps is wrong by a third, however short they are.
+SMOOTH_FLAG = {
+    "time.end": 0.2,
+    "fluid.initial_velocity": [0, 0],
+    "fluid.patches.inlet.velocity": ["(1-cos(pi*min(t,0.2)/0.2))/2*1.5*4*y*(0.41 - y)/0.41^2", 0],
+    "structure.bodies.flag.tractions": [{"on": "top", "value": [0, "100*sin(pi*min(t,0.2)/0.2)^2"]}],
+}
+
+
 @dataclass(frozen=True)
 class Row:
     """A case, as it is or shorter, and its levels."""
@@ -86,7 +96,7 @@ ROWS = (
     Row("cavity_flexible_bottom", {"time.end": 10.0}),
     Row("flap", {"time.end": 1.0}),
     Row("fsi3", COARSE_FLAG, finer("fsi3", (0.01, 0.4), (0.005, 0.6), (0.0025, 0.8)), "step and cells"),
-    Row("thin_flag"),
+    Row("thin_flag", SMOOTH_FLAG),
     Row(
         "falling_sphere",
         {"time.end": 0.4},

@@ -145,6 +145,7 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
     if case.elastic_bodies:
         from fsci.builder.elements import choose_element
         from fsci.builder.wall_pairs import wall_pairs
+        from fsci.check.damped_modes import alternating
         from fsci.check.dry_facets import dry_facets
         from fsci.check.stiff_slaves import stiff_slaves
         from fsci.check.unpaired import unpaired
@@ -161,6 +162,7 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         meshes = {name: found.meshes[name] for name in names}
         at = case.place("structure" if case.contact is None else "contact")
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
+        found.notes += list(alternating(case, found.meshes))
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in dry_facets(case, bodies)]
         stiff = stiff_slaves(case, found.meshes, found.pairs)  # none of those that the program finds
         found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in stiff]

@@ -29,7 +29,7 @@ from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
-from solvers.contact.unheld import nearest_gaps
+from solvers.contact.unheld import nearest_gaps, slips_freely
 from solvers.contact.violation import rounding, violation
 from solvers.contact.work import FrictionWork, GivenWork
 
@@ -252,6 +252,7 @@ class Contact:
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
             shares=np.zeros((len(which), len(self.pairs))) if slip is None else slip.shares[which],
             stuck=self.active_set.stuck[which],
+            free=slips_freely(self._unheld, self.terms.D_of_pair, self._covers, self.active_set.status)[which],
             c_n=self.c_n * stiffness,
             c_t=self.c_n * stiffness,
             touching=self._tolerance[which],

@@ -3,6 +3,9 @@
 Without a node in contact their equilibrium has no solution, although they may be free just until they touch. So the
 first iterate of a solve tries the node that is nearest. If it would pull, the next iterate opens it, and what is left
 is singular as before: which nodes are tried does not change a solution.
+
+If friction alone holds a body along its contacts and all its nodes slip in an iterate, it has no stiffness there:
+rounding would decide how far it moves. Such nodes get a slope of the traction over the slip (see `friction_rows`).
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.contact.law.law import SLIP, STICK, Statuses
 
 
 def nearest_gaps(bodies: Sequence[Sequence[int]], of_pair: Array, mean_gap: Array, active: NDArray[np.bool_]) -> Array:
@@ -27,3 +31,23 @@ def nearest_gaps(bodies: Sequence[Sequence[int]], of_pair: Array, mean_gap: Arra
         if mine.any() and not active[mine].any():
             found[mine] = np.maximum(found[mine], mean_gap[mine].min())
     return found
+
+
+def slips_freely(
+    bodies: Sequence[Sequence[int]], of_pair: Array, covered: NDArray[np.bool_], status: Statuses
+) -> NDArray[np.bool_]:
+    """Mask of the multipliers that slip on bodies which no node holds by sticking, shape (C,).
+
+    bodies, of_pair: as above; covered: mask of the multipliers with a constraint, (C,). A body is held if it sticks to
+    one that is, or to one that is not among these.
+    """
+    if not bodies:
+        return np.zeros(len(status), dtype=bool)
+    covers = (of_pair > 0.0) & covered
+    stuck = (covers & (status == STICK)).any(axis=1)
+    free, before = [set(pairs) for pairs in bodies], -1
+    while len(free) != before:
+        before = len(free)
+        free = [one for one in free if not any(stuck[p] and sum(p in other for other in free) == 1 for p in one)]
+    pairs = sorted(set().union(*free))
+    return (status == SLIP) & covers[pairs].any(axis=0)

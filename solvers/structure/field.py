@@ -244,6 +244,7 @@ class Structure:
             where = self.worst()
         elif found := inverted(self.bodies):
             kind, (reason, where) = FailureKind.INVERTED, found
+            reason += self._limit_point.explain()
         if reason is not None:
             raise StepFailed(self.name, kind, reason, iteration=iteration, where=where, history=history)
 

@@ -121,6 +121,20 @@ def test_an_arch_below_its_limit_or_pulled_does_not_snap(pressure, power):
     assert snaps(arch_under_a_load(pressure, power), 0.05, 1.0) == []
 
 
+def test_iterates_that_invert_elements_beyond_a_limit_point_say_so():
+    """Inverted elements are how Newton's method fails there as often as any other way."""
+    structure = arch_under_a_load(0.03, 1)
+    structure.initialise(0.0, 0.1)
+    body = structure.bodies[0]
+    body.set_displacement((body.points[:2].T * [-2.0, 0.0]).ravel())  # its mirror image
+    with pytest.raises(StepFailed, match=r"inverted \(volume ratio -1\) at iteration 3"):
+        structure.check_deformation(3, ())
+    before = structure.energy_sentinel.save()
+    structure.energy_sentinel.restore(before | {"limit_point": {"speeds": np.array([1.0] * 5 + [5.0]), "reached": 0.7}})
+    with pytest.raises(StepFailed, match=r"inverted .* no equilibrium beyond t = 0\.7: .* use dynamics"):
+        structure.check_deformation(3, ())
+
+
 def test_growth_that_is_usual_is_no_limit():
     limit = LimitPoint()
     for k in range(10):

@@ -91,6 +91,7 @@ def friction_rows(law: FrictionBound, at: Point, slopes: Slopes, status: Statuse
     factor = (weight * at.D)[:, None, None]
     q = trial_traction(at)
     projected, by_q, by_radius = _on_disc(q, status, law.radius(at), derivatives=True)
+    by_q = by_q + _slope_of_free(law, at)[:, None, None] * np.eye(dim)
     y_n = np.einsum("nd,nd->n", at.z + at.c_t[:, None] * at.slip, at.normals)[:, None, None]
 
     # dz_t = T dz - z_n dn and dq = T (dz + c_t du) - y_n dn, both along the surface; dP = by_q dq + by_radius ds
@@ -100,6 +101,17 @@ def friction_rows(law: FrictionBound, at: Point, slopes: Slopes, status: Statuse
     sliding = -at.c_t[:, None, None] * (by_q @ tangent)
     in_u = _in_displacements(closing, factor * turning, factor * sliding, slopes)
     return Rows(_missed(at, projected, weight), factor * in_z, in_u)
+
+
+def _slope_of_free(law: FrictionBound, at: Point) -> Array:
+    """Slope of the traction over q where a body slips that nothing holds, zero elsewhere, shape (m,).
+
+    The linearisation alone has it. Its stiffness k = s / h [Pa/m], with the size h of a node's area, lets friction s
+    at all nodes of a body move it by h in an iterate. As q is z_t + c_t u_t, the slope is k / (k + c_t).
+    """
+    size = np.where(at.D > 0.0, at.D, 1.0) ** (1.0 / (at.normals.shape[1] - 1))
+    stiffness = np.where(at.free, law.radius(at), 0.0) / size
+    return np.divide(stiffness, stiffness + at.c_t, out=np.zeros_like(stiffness), where=stiffness > 0.0)
 
 
 def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: Slopes) -> Sparse:

@@ -34,6 +34,7 @@ class Point:
     slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
     shares: Array  #: of each pair in the area that was covered at the beginning of the step, shape (m, pairs)
     stuck: NDArray[np.bool_]  #: mask of those that are not to stick because their slip reverses, shape (m,)
+    free: NDArray[np.bool_]  #: mask of those that slip on a body that nothing holds along its contacts, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
     c_t: Array  #: complementarity parameter of the slip [Pa/m], (m,)
     touching: Array  #: gap [m] below which it is a rounding error, shape (m,)
