@@ -195,8 +195,11 @@ class Cutter:
         piece_normal = normal[moments.piece_facet]
         if self.unions:
             moments, piece_normal = self._unions(moments, facets, x, normal, tied)
-        # on sheets, cells that are solid except for rounding have no fluid
-        overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
+        # on sheets, and where contact is dry, cells that are solid except for rounding have no fluid
+        dry = np.full(box.size, grid.sheets is not None)
+        if closing is not None:
+            dry[moments.cells[moments.piece_cell[closing[moments.piece_facet]]]] = True
+        overlap = moments.fraction > np.where(dry, 1.0 - NOTHING, 1.0 + NOTHING)
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
         touched = counts[moments.piece_facet] & (cells >= 0)
         is_cut, in_use = self._cut_cells(moments, cells, touched)
