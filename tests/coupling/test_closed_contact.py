@@ -45,8 +45,8 @@ output: {{fields_every: 0}}
 def test_nothing_passes_a_closed_contact(tmp_path, scheme, moved):
     """The lid and the block touch to rounding: cells between them without volume would join both sides of the block.
 
-    The pressure acts on the side of the block alone; on its top it reaches to the end of a cell at most, instead of
-    over half of it.
+    The pressure acts on the side of the block alone; on its top it acted over half of it, with these cells, and up to
+    the end of the cell of the edge without `closed_facets`.
     """
     text = CASE.format(scheme=scheme, start=-moved, end=3.0 - moved)
     (tmp_path / "case.yaml").write_text(text)
@@ -57,7 +57,7 @@ def test_nothing_passes_a_closed_contact(tmp_path, scheme, moved):
     assert abs(found["out"][-1]) < 1e-6
     assert abs(found["fluid.leak"][-1]) < 1e-6
     assert found["force.x"][-1] == pytest.approx(PRESSURE * HEIGHT, rel=1e-5)
-    assert -PRESSURE * CELL < found["force.y"][-1] < 1e-6
+    assert abs(found["force.y"][-1]) < 1e-6
 
 
 def test_check_says_nothing_of_a_gap_that_contact_closes(tmp_path):
