@@ -141,7 +141,7 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         from fsci.check.resolution import coarse
 
         found.notes += list(impulsive(case))
-        found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in coarse(case, bodies)]
+        found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in coarse(case, bodies, found.pairs)]
     if case.elastic_bodies:
         from fsci.builder.elements import choose_element
         from fsci.builder.wall_pairs import wall_pairs

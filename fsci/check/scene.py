@@ -58,7 +58,7 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
         first, second = by_name[one], by_name[other]
         if {first.moves, second.moves} != {True} and (first.elastic or second.elastic):
             continue  # an elastic body that is held in a given one
-        pair = _pair(pairs, first.name, second.name)
+        pair = pair_between(pairs, first.name, second.name)
         how = f"{depth:.3g} {case.units.length} deep"
         if pair is not None:
             names = f"bodies '{first.name}' and '{second.name}' of pair '{pair}'"
@@ -82,7 +82,8 @@ def _rests(case: Case, name: str) -> bool:
     return body is not None and body.motion is None and body.free is None
 
 
-def _pair(pairs: dict[str, PairSection], first: str, second: str) -> str | None:
+def pair_between(pairs: dict[str, PairSection], first: str, second: str) -> str | None:
+    """Name of the pair of contact that two bodies are the sides of."""
     for name, pair in pairs.items():
         if {first, second} == {side.body or side.obstacle for _, side in pair.sides}:
             return name

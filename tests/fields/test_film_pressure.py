@@ -97,6 +97,55 @@ def test_a_plug_warns_of_what_its_gaps_leak(element, grid, off, parts):
     assert [one.warns for one in said(fluid)] == [abs(off) > 5.0] * 2
 
 
+def flap(
+    element: str, height: float, viscosity: float, *, thickness: float = 0.18, scale: float = 1.0, x: float = 1.03
+):
+    """A flap on the floor of a channel with 41 x 11 cells, through which a mean velocity of 2/3 flows."""
+    corner = np.array([[x, -0.3], [x + thickness, -0.3], [x + thickness, height], [x, height]]) * scale
+    t = np.arange(40)[:, None] / 40
+    points = np.concatenate([a + t * (b - a) for a, b in zip(corner, np.roll(corner, -1, axis=0), strict=True)])
+    count = np.arange(len(points))
+    body = rigid_body("flap", points, np.stack([count, np.roll(count, -1)], axis=1))
+    inflow = field(lambda x, y, t: 4.0 * scale * (y / scale) * (1.0 - y / scale), 0)
+    patches = [
+        Patch("in", ("x-",), "velocity", inflow),
+        Patch("out", ("x+",), "outflow"),
+        Patch("walls", ("y-", "y+"), "no_slip"),
+    ]
+    grid = uniform([0, 0], [4 * scale, scale], [41, 11])
+    fluid = make_fluid(grid, patches, [body], element=element, scheme="steady", mu=viscosity * scale**2)
+    solve_steady(fluid)
+    return fluid
+
+
+@pytest.mark.parametrize("thickness", [0.18, 0.09])
+@pytest.mark.parametrize(("viscosity", "force", "off"), [(0.02, 2.591, 9.2), (0.2, 14.591, 6.3)])
+def test_a_flap_that_leaves_a_narrow_way(viscosity, force, off, thickness):
+    """The pressure in front of it is that which drives the flow through four cells at its tip, at Re 5 and 50.
+
+    force: of q2q1 with 251 x 65 cells, of the thicker flap.
+    """
+    fluid = flap("q2q1", 0.62, viscosity, thickness=thickness)
+    if thickness == 0.18:
+        error = 100.0 * (float(fluid.force()["flap"].sum(axis=0)[0]) / force - 1.0)
+        assert error == pytest.approx(off, abs=0.1)
+    of_body, gap = resolved(measure(fluid), "q2q1")
+    assert (of_body.warns, gap.to, gap.warns) == (False, "y+", True)
+    assert gap.share > 0.9
+
+
+def test_a_flap_that_leaves_a_wide_way():
+    """The same with 6.6 cells at its tip: no film."""
+    assert [one.to for one in resolved(measure(flap("q2q1", 0.4, 0.02)), "q2q1")] == [""]
+
+
+def test_a_flap_in_another_unit():
+    """Of length, with equal Reynolds number: the same shares."""
+    one, small = (measure(flap("q2q1", 0.62, 0.02, scale=scale))[0] for scale in (1.0, 1e-3))
+    assert small.gaps[0].share == pytest.approx(one.gaps[0].share, rel=1e-6)
+    assert small.layer == pytest.approx(one.layer, rel=1e-6)
+
+
 def test_velocities_continued_into_walls_are_no_flow():
     """With inertia, in gaps of 0.01 cells: those of their nodes are 1e4 times as fast as the fluid."""
     fluid = plug("q2q1", box((20, 10)), gap=0.001, inertia=True)

@@ -169,6 +169,14 @@ def test_bodies_before_the_flow():
         assert found.across == pytest.approx(across)
 
 
+def test_what_is_beyond_the_box_does_not_count():
+    """Three fifths of a flap are behind the face that it stands on; along a period all of it is in the flow."""
+    grid, flap = uniform([0, 0], [10, 10], [100, 100]), block((0.5, 2), (3, -1.2))
+    for mirror, periodic, across in ((False, (), 8), (True, (), 16), (False, (0,), 8), (False, (1,), 20)):
+        (found,) = at_start(grid, [(WallPlane(1, 0, mirror), "y-")], [("flap", flap)], periodic)
+        assert found.across == pytest.approx(across)
+
+
 # -------------------------------------------------------------------------------------------------------- in the flow
 
 

@@ -13,6 +13,7 @@ from solvers.api import Array, Indices32
 from solvers.fluid.cut.film import Films, Walls, creeping_cells, walls_of
 from solvers.fluid.cut.gaps import GapFinder, NarrowGaps
 from solvers.fluid.cut.images import Images, Periods
+from solvers.fluid.geometry.closed_facets import without_closed
 from solvers.fluid.geometry.overlaps import Unions
 from solvers.fluid.geometry.pieces import (
     NOTHING,
@@ -24,7 +25,7 @@ from solvers.fluid.geometry.pieces import (
     without_slivers,
 )
 from solvers.fluid.geometry.tied_slits import filled, slivers_of, without_slits
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FLUSH, Grid
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.sheet_cells import on_sheets
 from solvers.fluid.surfaces.surface import Motion
@@ -115,6 +116,7 @@ class Cutter:
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
         self._slivers = slivers_of(grid.grid)
+        self._smallest = min(float(np.diff(edge).min()) for edge in grid.grid.edges)
         self._first: _First | None = None
         self._of_step: Cut | None = None
         self._whole: Cut | None = None  #: without surfaces
@@ -192,11 +194,16 @@ class Cutter:
         if closing is not None:
             still = self._closed & (moments.fraction > 1.0 - SLIT) if self._steady else self._shut
             moments = filled(moments, self.points, still)
+            if grid.sheets is None:
+                moments = without_closed(moments, facets, x, closing, FLUSH * self._smallest)
         piece_normal = normal[moments.piece_facet]
         if self.unions:
             moments, piece_normal = self._unions(moments, facets, x, normal, tied)
-        # on sheets, cells that are solid except for rounding have no fluid
-        overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
+        # on sheets, and where contact is dry, cells that are solid except for rounding have no fluid
+        dry = np.full(box.size, grid.sheets is not None)
+        if closing is not None:
+            dry[moments.cells[moments.piece_cell[closing[moments.piece_facet]]]] = True
+        overlap = moments.fraction > np.where(dry, 1.0 - NOTHING, 1.0 + NOTHING)
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
         touched = counts[moments.piece_facet] & (cells >= 0)
         is_cut, in_use = self._cut_cells(moments, cells, touched)

@@ -9,7 +9,9 @@ U the largest velocity relative to the body within half of its extent around it.
 share of the force in them is the part of int |t - t_0 n| dS over the surface that lies in front of another wall, within
 `NARROW` cells and the extent of the body; t is the traction and t_0 the median of its normal part, which the level of
 the pressure changes. Force on the rest of the body that nothing there explains is that of a film whose friction holds
-it: a plug that squeezes fluid through the gaps beside it.
+it: a plug that squeezes fluid through the gaps beside it. So is the pressure on the rest, as (V / U)^2, where V is the
+largest velocity in the film: a flap that leaves a narrow way, in which the flow is fastest, has in front of it the
+pressure that drives the flow through there, against friction and as the dynamic pressure rho V^2 / 2.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from solvers.api import Array
 from solvers.fluid.cut.extension import FREE_SHARE
@@ -52,7 +55,7 @@ def measure(fluid: Fluid) -> list[BodyCells]:
     bodies = [(body.surface.name, part + way) for body, part, way in zip(fluid.bodies, corners, homes, strict=True)]
     walls = walls_of_box((patch.faces, patch.record) for patch in fluid.patches)
     force, wet = fluid.system.force_on_facets()
-    scene = scene_of(fluid.grid.grid, walls, bodies, wet > 0.0)
+    scene = scene_of(fluid.grid.grid, walls, bodies, wet > 0.0, fluid.unknowns.periodic)
     return [_of_body(fluid, scene, body, force, wet) for body in present(scene)]
 
 
@@ -70,8 +73,14 @@ def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Ar
     counts = np.where(free, min(1.0, around) * all_of_it, np.minimum(all_of_it, IN_FILMS * of_flow))
     area, friction = scene.of_samples(wet), scene.of_samples(shear)
     rest, drag = float((all_of_it - counts)[free].sum()), float(friction[free].sum())
-    drops = {film: pressure_drop(scene, here, friction) for film, here in films_of(scene, body).items()}
-    beyond = {film: min(rest, drop * float(area[free].sum())) for film, drop in drops.items()}
+    of_pressure = float(scene.of_samples(np.abs(along - level * wet))[free].sum())
+    beyond = {}
+    for film, here in films_of(scene, body).items():
+        through = _speed_in(fluid, scene, body, here)
+        drop = pressure_drop(scene, here, friction)
+        drop += 0.5 * fluid.settings.density * through**2 if fluid.settings.convection else 0.0
+        caused = max(rest, min(1.0, through / max(speed, 1e-300)) ** 2 * of_pressure)
+        beyond[film] = min(caused, drop * float(area[free].sum()))
     found = shape_of(scene, body, all_of_it, counts, beyond)
     if drag == 0.0:
         return replace(found, layer=np.inf)
@@ -116,6 +125,20 @@ def _speed(fluid: Fluid, body: int) -> float:
     near = ((x > low - margin) & (x < high + margin)).all(axis=1)
     active = fluid.system.active_dofs[nodes.dofs].all(axis=1)
     velocity = fluid.flow[nodes.dofs[near & active & _well_cut(fluid)]] - motion.v.mean(axis=0)
+    return float(fluid.comm.allreduce(np.linalg.norm(velocity, axis=1).max(initial=0.0), op=MPI.MAX))
+
+
+def _speed_in(fluid: Fluid, scene: SurfaceScene, body: int, film: NDArray[np.int64]) -> float:
+    """Largest velocity relative to a body in one of its films, or within a cell of its middle [m/s] (collective)."""
+    motion, nodes, samples = fluid.moving.motions[body], fluid.unknowns.velocity, scene.samples
+    half = 0.5 * scene.gaps.cells[film] * samples.across[film]
+    middle, reach = samples.x[film] + half[:, None] * samples.normal[film], np.maximum(half, samples.across[film])
+    low, high = middle.min(axis=0) - reach.max(), middle.max(axis=0) + reach.max()
+    x = nodes.points[:, : fluid.dim]
+    active = fluid.system.active_dofs[nodes.dofs].all(axis=1) & _well_cut(fluid)
+    near = np.flatnonzero(active & ((x > low) & (x < high)).all(axis=1))
+    distance, nearest = cKDTree(middle).query(x[near])
+    velocity = fluid.flow[nodes.dofs[near[distance <= reach[nearest]]]] - motion.v.mean(axis=0)
     return float(fluid.comm.allreduce(np.linalg.norm(velocity, axis=1).max(initial=0.0), op=MPI.MAX))
 
 

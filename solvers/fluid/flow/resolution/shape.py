@@ -46,6 +46,7 @@ class SurfaceScene:
     samples: SurfaceSamples
     gaps: SampledGaps
     mirrors: list[tuple[int, float]]  #: axis and position [m] of the planes of symmetry
+    ends: Array  #: of the box, beyond which nothing of a body counts, (2, dim) [m]; infinite along periods
     sharp: NDArray[np.bool_]  #: whether a body has edges
 
     def of_samples(self, by_facet: Array) -> Array:
@@ -59,10 +60,11 @@ def scene_of(
     walls: Sequence[tuple[WallPlane, str]],
     bodies: Sequence[tuple[str, Array]],
     wet: NDArray[np.bool_] | None = None,
+    periodic: Sequence[int] = (),
 ) -> SurfaceScene:
     """Of bodies by (name, corners of their facets).
 
-    walls: of the box, with names; wet: mask of the facets that count.
+    walls: of the box, with names; wet: mask of the facets that count; periodic: axes of the box.
     """
     corners = np.concatenate([corners for _, corners in bodies])
     owner = np.repeat(np.arange(len(bodies)), [len(corners) for _, corners in bodies])
@@ -74,11 +76,16 @@ def scene_of(
     names, faces = [name for name, _ in bodies], [face for _, face in walls]
     wet_facets = np.unique(samples.facet)
     sharp = np.array([has_edges(corners[wet_facets[owner[wet_facets] == body]]) for body in range(len(names))])
-    return SurfaceScene(names, faces, corners, owner, samples, found, mirrors, sharp)
+    ends = np.array([[edge[0], edge[-1]] for edge in grid.edges]).T
+    ends[:, list(periodic)] = [[-np.inf], [np.inf]]
+    return SurfaceScene(names, faces, corners, owner, samples, found, mirrors, ends, sharp)
 
 
 def at_start(
-    grid: Grid, walls: Sequence[tuple[WallPlane, str]], bodies: Sequence[tuple[str, Array]]
+    grid: Grid,
+    walls: Sequence[tuple[WallPlane, str]],
+    bodies: Sequence[tuple[str, Array]],
+    periodic: Sequence[int] = (),
 ) -> list[BodyCells]:
     """Of bodies as in `scene_of`, without a flow.
 
@@ -86,7 +93,7 @@ def at_start(
     """
     if not bodies:
         return []
-    scene = scene_of(grid, walls, bodies)
+    scene = scene_of(grid, walls, bodies, periodic=periodic)
     acting = scene.samples.area / np.minimum(scene.gaps.cells, 1e6) ** 2
     return [shape_of(scene, body, acting, acting) for body in present(scene)]
 
@@ -130,8 +137,8 @@ def is_narrow(scene: SurfaceScene, body: int) -> NDArray[np.bool_]:
 
 
 def _across(scene: SurfaceScene, body: int) -> float:
-    """Cells across a body: the longer extent of a rectangle, the middle one in space."""
-    points = scene.corners[scene.owner == body].reshape(-1, scene.corners.shape[2])
+    """Cells across what is in the box of a body: the longer extent of a rectangle, the middle one in space."""
+    points = np.clip(scene.corners[scene.owner == body].reshape(-1, scene.corners.shape[2]), *scene.ends)
     extent = np.ptp(points, axis=0)
     for axis, position in scene.mirrors:  # half of a body, or a quarter
         if np.abs(points[:, axis] - position).min() < 1e-6 * extent[axis]:
