@@ -94,10 +94,11 @@ def cell_forms(
     parts, what = (*unknowns.parts(function), *unknowns.parts(test)), "the flow's derivative by the motion of surfaces"
     points, middle = weights.reference, np.full((1, domain.dim), 0.5)
     in_cut, special = (fem.Pointwise(domain, some, points, what) for some in _on_cut(*both, parts, gaps))
+    moving = in_cut, special, MeanIntegrands(domain, both[1])
     if gaps is None:
-        return replace(found, films=(special, FilmIntegrands(domain, both[1], parts, points)))
+        return replace(found, moving=moving, films=(special, FilmIntegrands(domain, both[1], parts, points)))
     in_gaps = fem.Pointwise(domain, forms.flow_in_gaps(flow, gaps, *parts[:2]), middle, "the flow in gaps")
-    return replace(found, flow_in_gaps=in_gaps, moving=(in_cut, special, MeanIntegrands(domain, both[1])))
+    return replace(found, flow_in_gaps=in_gaps, moving=moving)
 
 
 def _residuals(
