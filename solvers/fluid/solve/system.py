@@ -286,11 +286,13 @@ class FlowSystem:
         if self.with_bodies and (self._touched or self._interface is None):
             penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
+            assert self.forms.surfaces is not None
             self._interface = InterfaceTerms(
                 self.grid,
                 self.unknowns,
                 self.weights,
                 cut,
+                self.forms.surfaces,
                 self.viscosity.of(cut.cut[cut.pieces.cell]),
                 penalty,
                 self.slip_length,

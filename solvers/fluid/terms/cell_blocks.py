@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 
+#: Pieces that are evaluated together. Arrays at their quadrature points are large in 3D.
+PIECES_AT_ONCE = 256
+
 
 @dataclass(frozen=True)
 class CellBlocks:
@@ -38,3 +41,22 @@ def cell_blocks(cells: NDArray[np.int32], dofs: NDArray[np.int32], by_piece: Arr
     if len(first):
         blocks = np.add.reduceat(blocks, first, axis=0)
     return CellBlocks(dofs[first].astype(np.int32), blocks)
+
+
+def by_functions(area: Array, table: tuple[Array, Array], coefficients: Array, sizes: Array) -> Array:
+    """int sum_fg c_fkgl F_fa F_gb by pieces with F = (phi, grad phi), shape (pieces, functions, k, functions, l).
+
+    area: int L_q, (pieces, points); table: values (points, functions) and reference gradients (points, functions, dim)
+    at these points; coefficients: c, (pieces, fields, k, fields, l); sizes: edge lengths of cells [m], (pieces, dim).
+    """
+    (pieces, fields, size), functions = coefficients.shape[:3], table[0].shape[1]
+    block = np.zeros((pieces, functions, size, functions, size))
+    gives = np.flatnonzero(coefficients.any(axis=(1, 2, 3, 4)))
+    for some in (gives[first : first + PIECES_AT_ONCE] for first in range(0, len(gives), PIECES_AT_ONCE)):
+        slopes = table[1] / sizes[some][:, None, None, :]
+        F = [np.broadcast_to(table[0], slopes.shape[:3]), *np.moveaxis(slopes, 3, 0)]
+        for f, g in np.ndindex(fields, fields):
+            if (c := coefficients[some, f, :, g]).any():
+                both = np.swapaxes(area[some][:, :, None] * F[f], 1, 2) @ F[g]
+                block[some] += np.einsum("pab,pkl->pakbl", both, c)
+    return block

@@ -10,7 +10,7 @@ In films S and S_f are those of `film_shape`, elsewhere in flows in time those o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,7 @@ def interface_entries(
     if of_sweep is not None:
         load_by_shape = load_by_shape + of_sweep.force
     into.data[held[into.indices]] = 0.0
-    back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
+    back = sums.with_flow(operator.load)
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
     if by_penalty is not None:
         load = load + by_penalty

@@ -25,7 +25,8 @@ from solvers.fluid.terms.gap_terms import GapTerms
 from solvers.fluid.terms.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.terms.shape_derivatives.film_crossings import barycentric, crossing_moments
 from solvers.fluid.terms.shape_derivatives.shape import normal_derivative
-from solvers.fluid.terms.shape_derivatives.surface_integrands import MeanIntegrands, along_normal
+from solvers.fluid.terms.shape_derivatives.surface_integrands import MeanIntegrands
+from solvers.fluid.terms.surface_terms import along_normal
 
 #: Extent of a facet, in motions, from which on the end of a surface stays on it. Newton's method cycles in contact with
 #: 1; with 3, 10, 100 and 1,000 `torus_wall` on 8 x 8 x 13 cells takes 231, 235, 242 and 249 iterations in all, without
@@ -74,7 +75,7 @@ def cut_derivatives(
     n, dim, mine = at.n, at.dim, np.flatnonzero(cut.cut[cut.pieces.cell] < grid.owned)
     local, moments = cut.cut[cut.pieces.cell[mine]], cut.pieces.moments[mine][:, rule.order]
     index = np.stack(np.unravel_index(grid.numbers[local], grid.grid.shape, order="F"), axis=1)
-    origin = np.stack([edge[i] for edge, i in zip(grid.grid.edges, index.T, strict=True)], axis=1)
+    origin = grid.origins(local)
 
     means, slopes = _means(at, state.flow)
     area = moments.sum(axis=1)
@@ -95,7 +96,7 @@ def cut_derivatives(
 
     force, leak = f[:, :dim], f[:, dim]
     rows = _rows(at, rule, moments, local, (by_motion[..., : dim + 1], leak), state)
-    if at.mobility is not None:
+    if at.surface.mobility is not None:
         rows[-1][..., -1] += np.einsum("pak,pcjk->pacj", at.pressure_slope, by_motion[..., dim + 1 :])
 
     loads = at.mass_of_pieces[..., None, None] * of_force[:, None, None]
@@ -190,7 +191,7 @@ def _changes(at: InterfaceTerms, g: Array, inertia: Array, state: FlowTerms) -> 
     ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
     ds_n = state.density * factors.mass * state.alpha * dh
     # D = 1 / (1 / c + s) in each direction
-    d_n, d_t = (part[:, None, None] for part in along_normal(at.released, n))
+    d_n, d_t = (part[:, None, None] for part in along_normal(at.surface.released, n))
     parameters = ds, ds_n, inertia[:, None, None] * dh / h, -(d_n**2) * (ds + ds_n), -(d_t**2) * ds
     return stretch, np.concatenate([turn, np.stack(parameters, axis=1)], axis=1)
 
