@@ -49,14 +49,17 @@ def by_functions(area: Array, table: tuple[Array, Array], coefficients: Array, s
     area: int L_q, (pieces, points); table: values (points, functions) and reference gradients (points, functions, dim)
     at these points; coefficients: c, (pieces, fields, k, fields, l); sizes: edge lengths of cells [m], (pieces, dim).
     """
-    (pieces, fields, size), functions = coefficients.shape[:3], table[0].shape[1]
+    (pieces, _, size), (points, functions) = coefficients.shape[:3], table[0].shape
+    F = np.concatenate([table[0][None], np.moveaxis(table[1], 2, 0)])
+    scale = np.concatenate([np.ones((pieces, 1)), 1.0 / sizes], axis=1)
+    c = coefficients * scale[:, :, None, None, None] * scale[:, None, None, :, None]
+    f, g = np.nonzero(c.any(axis=(0, 2, 4)))
+    pairs = np.einsum("fqa,fqb->qfab", F[f], F[g]).reshape(points, len(f) * functions**2)
     block = np.zeros((pieces, functions, size, functions, size))
-    gives = np.flatnonzero(coefficients.any(axis=(1, 2, 3, 4)))
+    gives = np.flatnonzero(c.any(axis=(1, 2, 3, 4)))
     for some in (gives[first : first + PIECES_AT_ONCE] for first in range(0, len(gives), PIECES_AT_ONCE)):
-        slopes = table[1] / sizes[some][:, None, None, :]
-        F = [np.broadcast_to(table[0], slopes.shape[:3]), *np.moveaxis(slopes, 3, 0)]
-        for f, g in np.ndindex(fields, fields):
-            if (c := coefficients[some, f, :, g]).any():
-                both = np.swapaxes(area[some][:, :, None] * F[f], 1, 2) @ F[g]
-                block[some] += np.einsum("pab,pkl->pakbl", both, c)
+        moments = (area[some] @ pairs).reshape(len(some), len(f), functions**2)
+        of_pairs = c[some][:, f, :, g].transpose(1, 2, 3, 0).reshape(len(some), size**2, len(f))
+        found = (of_pairs @ moments).reshape(len(some), size, size, functions, functions)
+        block[some] = found.transpose(0, 3, 1, 4, 2)
     return block
