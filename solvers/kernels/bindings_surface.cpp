@@ -17,23 +17,29 @@ void py_surface_rows(const Values<const double, 3>& moments, const Values<const 
                      const Values<const double, 4>& fields, const Values<const double, 4>& by_motion,
                      const Values<const double, 1>& leak, const Values<double, 5>& rows) {
     const std::size_t pieces = normal.shape(0), dim = normal.shape(1), points = density.shape(1);
-    require(dim == 2 || dim == 3, "normals have two or three components");
-    const std::size_t functions = std::size_t{1} << dim;
+    const std::size_t functions = density.shape(2), size = density.shape(3);
+    void (*of)(std::size_t, const SurfaceRows&, double*) = nullptr;
+    const auto is = [&](std::size_t d, std::size_t f, std::size_t s) { return dim == d && functions == f && size == s; };
+    if (is(2, 4, 3)) of = surface_rows<2, 4, 3>;  // first degree: momentum and continuity
+    if (is(3, 8, 4)) of = surface_rows<3, 8, 4>;
+    if (is(2, 9, 2)) of = surface_rows<2, 9, 2>;  // second degree: momentum
+    if (is(3, 27, 3)) of = surface_rows<3, 27, 3>;
+    if (is(2, 4, 1)) of = surface_rows<2, 4, 1>;  // and continuity
+    if (is(3, 8, 1)) of = surface_rows<3, 8, 1>;
+    require(of != nullptr, "no element has such rows");
     require_shape("moments", moments, pieces, points, dim);
-    require_shape("density", density, density.shape(0), points, functions, dim + 1);
     require_shape("cell", cell, pieces);
     require_shape("fields", fields, pieces, functions, dim, dim + 1);
-    require_shape("by_motion", by_motion, pieces, dim, dim, dim + 1);
+    require_shape("by_motion", by_motion, pieces, dim, dim, size);
     require_shape("leak", leak, pieces);
-    require_shape("rows", rows, pieces, functions, dim, dim, dim + 1);
+    require_shape("rows", rows, pieces, functions, dim, dim, size);
     for (std::size_t p = 0; p < pieces; ++p)
         require(cell.data()[p] >= 0 && static_cast<std::size_t>(cell.data()[p]) < density.shape(0),
                 "a piece is in no cell of the density");
     const SurfaceRows at{points,        moments.data(), density.data(),   cell.data(),
                          normal.data(), fields.data(),  by_motion.data(), leak.data()};
     nb::gil_scoped_release release;
-    if (dim == 2) surface_rows<2>(pieces, at, rows.data());
-    else surface_rows<3>(pieces, at, rows.data());
+    of(pieces, at, rows.data());
 }
 
 nb::object py_seen_angles(const Values<const double, 2>& points, const Values<const double, 2>& vertices,
@@ -59,9 +65,9 @@ nb::object py_seen_angles(const Values<const double, 2>& points, const Values<co
 void bind_surface(nb::module_& module) {
     module.def("surface_rows", &py_surface_rows, "moments"_a, "density"_a, "cell"_a, "normal"_a, "fields"_a, "by_motion"_a,
                "leak"_a, "rows"_a,
-               "Set `rows`, (pieces, functions, vertices, dim, dim + 1), to the rows of the flow by the motion of vertices.\n\n"
+               "Set `rows`, (pieces, functions, vertices, dim, components), to the rows of the flow by the motion of vertices.\n\n"
                "rows[p, a, c, j, i] = n_j sum_q moments[p, q, c] density[cell, q, a, i] - int phi_a by_motion[p, c, j, i],\n"
-               "and - leak int d_j phi_a N_c in the last i.");
+               "and - leak int d_j phi_a N_c in the last i, unless the components are those of momentum alone.");
     module.def("seen_angles", &py_seen_angles, "points"_a, "vertices"_a, "facets"_a, "in_plane"_a,
                "Sum of the angles of segments, or of halves of solid angles of triangles, seen from points, shape (points,).\n\n"
                "in_plane: sine of the angle between a point and the plane of a facet up to which the facet is not seen.");

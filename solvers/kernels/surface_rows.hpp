@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-// Arrays of first degree with 2^dim functions; components last.
+// Arrays of momentum, of continuity, or of both, whose components are last.
 struct SurfaceRows {
     std::size_t points;
     const double* moments;     // (pieces, q, c): int L_q N_c
@@ -16,11 +16,11 @@ struct SurfaceRows {
     const double* leak;        // (pieces,): (u - g) . n
 };
 
-// rows (pieces, a, c, j, i) = n_j sum_q moments density - sum_c' int phi_a N_c' by_motion, and in the last i, that of
-// the continuity equation, - leak int d_j phi_a N_c.
-template <int dim>
+// rows (pieces, a, c, j, i) = n_j sum_q moments density - sum_c' int phi_a N_c' by_motion, and in the last i, unless
+// there is momentum alone, that of the continuity equation, - leak int d_j phi_a N_c.
+template <int dim, int functions, int size>
 void surface_rows(std::size_t pieces, const SurfaceRows& at, double* rows) {
-    constexpr int vertices = dim, size = dim + 1, functions = 1 << dim, area = functions * size;
+    constexpr int vertices = dim, area = functions * size;
     for (std::size_t p = 0; p < pieces; ++p) {
         const double* moment = at.moments + p * at.points * vertices;
         const double* integrand = at.density + static_cast<std::size_t>(at.cell[p]) * at.points * area;
@@ -31,15 +31,15 @@ void surface_rows(std::size_t pieces, const SurfaceRows& at, double* rows) {
         const double* n = at.normal + p * dim;
         const double* motion = at.by_motion + p * vertices * dim * size;
         for (int a = 0; a < functions; ++a) {
-            const double* field = at.fields + (p * functions + a) * vertices * size;
+            const double* field = at.fields + (p * functions + a) * vertices * (1 + dim);
             double phi = 0.0;
-            for (int c = 0; c < vertices; ++c) phi += field[c * size];
+            for (int c = 0; c < vertices; ++c) phi += field[c * (1 + dim)];
             for (int c = 0; c < vertices; ++c)
                 for (int j = 0; j < dim; ++j) {
                     double* entry = rows + (((p * functions + a) * vertices + c) * dim + j) * size;
                     for (int i = 0; i < size; ++i)
                         entry[i] = bulk[c][a * size + i] * n[j] - phi * motion[(c * dim + j) * size + i];
-                    entry[dim] -= at.leak[p] * field[c * size + 1 + j];
+                    if (size != dim) entry[size - 1] -= at.leak[p] * field[c * (1 + dim) + 1 + j];
                 }
         }
     }

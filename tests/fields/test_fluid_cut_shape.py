@@ -1,4 +1,4 @@
-"""Rows and force of a first-degree flow by the motion of a body in it: against differences."""
+"""Rows and force of a flow by the motion of a body in it: against differences."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ class Moving:
         fluid.move({})
         fluid.residual()
         state, system, nodes = fluid.flow.copy(), fluid.system, fluid.unknowns
-        derived = system.shape_derivatives(improved=improved) if shape else None
+        derived = system.shape_derivatives(improved=improved) if shape else (None, None)
         nothing_held, at = np.zeros(len(state), dtype=bool), (nodes.velocity.dofs, nodes.pressure.dofs)
         given = system.assemble_interface(), nodes, state, 1.0 / DT, nothing_held, np.arange(len(change)), derived
         entries, rows, forces = interface_entries(*given), [], []
@@ -50,9 +50,10 @@ class Moving:
         return [(into[dofs], exact[dofs]) for dofs in at] + [(found_force, force)]
 
 
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 @pytest.mark.parametrize(("slip", "layer"), [(0.0, 0.0), (0.02, 3e-4)])
 @pytest.mark.parametrize("dim", [2, 3])
-def test_exact_where_the_stress_is_constant(dim, slip, layer):
+def test_exact_where_the_stress_is_constant(dim, slip, layer, element):
     """A constant stress, slip u - g and slip before. Slopes of test functions jump, but not those of their sum.
 
     The box is open: Nitsche's penalty would jump between cells in gaps of less than a cell.
@@ -60,7 +61,7 @@ def test_exact_where_the_stress_is_constant(dim, slip, layer):
     slopes = np.array([[0.4, 2.0, -0.5], [1.0, -0.7, 0.8], [0.6, -1.1, 0.3]])[:dim, :dim]
     faces = ("x-", "x+", "y-", "y+", "z-", "z+")[: 2 * dim]
     patches = [Patch("open", faces, "traction", field(*[0.3, -0.2, 0.1][:dim]))]
-    moving = Moving(dim, patches, slip=slip, layer=layer, rho=1.3, mu=0.7)
+    moving = Moving(dim, patches, slip=slip, layer=layer, rho=1.3, mu=0.7, element=element)
     fluid, against = moving.fluid, np.array([0.5, -0.8, 0.3])[:dim]
     nodes = fluid.unknowns.velocity
     fluid.flow[nodes.dofs] = nodes.points[:, :dim] @ slopes.T
@@ -93,6 +94,15 @@ def test_nearly_exact_in_a_flow(dim):
     now, before = errors(dim), errors(dim, shape=False)
     assert (now < 0.1).all()
     assert (before > 3.0 * now).all()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_nearer_to_differences_with_second_degree(dim):
+    """Momentum lacks the penalty of poorly cut cells, also with exact integrands at surfaces (0.14 in 2D, 0.19)."""
+    now, before = errors(dim, element="q2q1"), errors(dim, element="q2q1", shape=False)
+    assert (now < [0.2, 0.07, 0.07]).all()
+    assert before[0] > now[0]
+    assert before[1] > 5.0 * now[1]
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -140,8 +150,9 @@ def with_more(flow, u, p, v, q, bulk=forms.bulk):
     return bulk(flow, u, p, v, q) + 3.0 * u2 * ufl.dot(u, v) + u2 * q + more
 
 
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 @pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
-def test_a_term_of_the_forms_alone(dim, monkeypatch):
+def test_a_term_of_the_forms_alone(dim, element, monkeypatch):
     """Terms that `forms` alone has are differentiated: what they add is exact, row by row, in any flow."""
     added, walls = (
         [],
@@ -149,7 +160,7 @@ def test_a_term_of_the_forms_alone(dim, monkeypatch):
     )
     for bulk in (with_more, forms.bulk):
         monkeypatch.setattr(forms, "bulk", bulk)
-        moving, some = Moving(dim, walls), np.random.default_rng(3)
+        moving, some = Moving(dim, walls, element=element), np.random.default_rng(3)
         system = moving.fluid.system
         system.history.x.array[:] = some.normal(size=len(system.history.x.array))
         moving.fluid.flow[:] = some.normal(size=len(moving.fluid.flow))

@@ -86,6 +86,11 @@ class DistributedGrid:
             nodes[finest] = self.sheets.nodes(self.in_sheets[cells[finest]], degree, steps)
         return nodes
 
+    def origins(self, cells: NDArray[np.int32]) -> Array:
+        """First corners of some local cells of the finest lattice [m], shape (cells, dim)."""
+        index = np.unravel_index(self.numbers[cells], self.grid.shape, order="F")
+        return np.stack([edge[i] for edge, i in zip(self.grid.edges, index, strict=True)], axis=1)
+
     def find_interior_faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """(local faces, their two local cells) of all faces between two local cells; found once (collective)."""
         if self._interior_faces is None:

@@ -243,28 +243,28 @@ class FlowSystem:
         assert self._interface is not None
         return self._interface
 
-    def shape_derivatives(self, *, improved: bool) -> FilmDerivatives | CutDerivatives | None:
-        """Derivatives by the motion of surfaces: of first-degree flows in time, or in films (collective).
+    def shape_derivatives(self, *, improved: bool) -> tuple[CutDerivatives | None, FilmDerivatives | None]:
+        """Derivatives by the motion of surfaces: of all pieces, and those that replace them in films (collective).
 
-        None in steady first-degree flows, where the first increments would be too large, and without films. improved:
-        the step has an increment; before, there are no derivatives in films.
+        None in steady flows, where the first increments would be too large, and for second degree until the step has an
+        increment. improved: it has.
         """
         at, cut, settings, degree = self.assemble_interface(), self.cut, self.settings, self.settings.degree
         assert cut is not None
-        if not improved if degree > 1 else settings.steady:
-            return None
-        flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
+        if degree > 1 and not improved:
+            return None, None
+        flow, of_all = self.flow.x.array, None
         g = at.at_corners(cut.motion.v, self.sweep_velocity)
-        if degree > 1:
-            assert self.forms.films is not None
-            return film_derivatives(at, self.unknowns, self.weights, cut, self.forms.films, g, self._least)
-        assert self.gaps is not None
-        assert self.forms.moving is not None
-        # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
-        moved = self._moved if improved and self.may_close is None else np.inf
-        terms = settings.convection, settings.penalties, self.forms.moving, self.gaps
-        state = FlowTerms(flow, density, alpha, *terms, moved, g)
-        return cut_derivatives(at, self.weights, self.grid, cut, state)
+        if not settings.steady:
+            assert self.forms.moving is not None
+            # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
+            moved = self._moved if improved and self.may_close is None else np.inf
+            terms = settings.convection, settings.penalties, self.forms.moving, degree, self.gaps
+            state = FlowTerms(flow, settings.density, float(self._alpha.value), *terms, moved, g)
+            of_all = cut_derivatives(at, self.weights, self.grid, cut, state)
+        if self.forms.films is None:
+            return of_all, None
+        return of_all, film_derivatives(at, self.unknowns, self.weights, cut, self.forms.films, g, self._least)
 
     def assemble_zone(self) -> ClosedZone | None:
         """Fluid pressure in closed contact; None if no contact is closed (collective)."""
@@ -286,11 +286,13 @@ class FlowSystem:
         if self.with_bodies and (self._touched or self._interface is None):
             penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
+            assert self.forms.surfaces is not None
             self._interface = InterfaceTerms(
                 self.grid,
                 self.unknowns,
                 self.weights,
                 cut,
+                self.forms.surfaces,
                 self.viscosity.of(cut.cut[cut.pieces.cell]),
                 penalty,
                 self.slip_length,

@@ -14,6 +14,7 @@ from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.flow_settings import FlowSettings
 from solvers.fluid.terms import forms, nitsche
 from solvers.fluid.terms.shape_derivatives.surface_integrands import FilmIntegrands, MeanIntegrands
+from solvers.fluid.terms.surface_terms import SurfaceOperators
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class CellForms:
     #: function, for first degree what is added in gaps, and the terms of surfaces
     moving: tuple[fem.Pointwise, fem.Pointwise, MeanIntegrands] | None = None
     films: tuple[fem.Pointwise, FilmIntegrands] | None = None
+    surfaces: SurfaceOperators | None = None  #: with bodies
 
     def integrals(self) -> list[fem.Integral]:
         """Forms to compile at the start; those of films are compiled when a film appears."""
@@ -94,10 +96,12 @@ def cell_forms(
     parts, what = (*unknowns.parts(function), *unknowns.parts(test)), "the flow's derivative by the motion of surfaces"
     points, middle = weights.reference, np.full((1, domain.dim), 0.5)
     in_cut, special = (fem.Pointwise(domain, some, points, what) for some in _on_cut(*both, parts, gaps))
+    moving = in_cut, special, MeanIntegrands(domain, both[1])
+    found = replace(found, surfaces=SurfaceOperators(domain, both[1]))
     if gaps is None:
-        return replace(found, films=(special, FilmIntegrands(domain, both[1], parts, points)))
+        return replace(found, moving=moving, films=(special, FilmIntegrands(domain, both[1], parts, points)))
     in_gaps = fem.Pointwise(domain, forms.flow_in_gaps(flow, gaps, *parts[:2]), middle, "the flow in gaps")
-    return replace(found, flow_in_gaps=in_gaps, moving=(in_cut, special, MeanIntegrands(domain, both[1])))
+    return replace(found, flow_in_gaps=in_gaps, moving=moving)
 
 
 def _residuals(

@@ -5,12 +5,12 @@ whose velocity is g = alpha d - ..., rows r and force f of the flow change by
 
     dr = (alpha C + S) dd,    df = C^T S dw - (alpha M + S_f) dd.
 
-In films S and S_f are those of `film_shape`. Those of `cut_shape` are taken in first-degree flows in time.
+In films S and S_f are those of `film_shape`, elsewhere in flows in time those of `cut_shape`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,40 +34,40 @@ def interface_entries(
     alpha: float,
     held: NDArray[np.bool_],
     vertices: NDArray[np.int64],
-    shape: FilmDerivatives | CutDerivatives | None = None,
+    shape: tuple[CutDerivatives | None, FilmDerivatives | None] = (None, None),
     swept: Array | None = None,
 ) -> InterfaceEntries:
     """Entries for the motion of some vertices, in the given order.
 
     flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd;
-    shape: derivatives by the shape of some or all pieces, which replace those of the module `shape`; swept: that of the
-    velocity of facets beside that of their vertices, `Sweep.by_motion`.
+    shape: derivatives by the shape of all pieces, None: those of the module `shape`, and those that replace them in
+    films; swept: that of the velocity of facets beside that of their vertices, `Sweep.by_motion`.
     """
     C, sums = operator.coupling, _Sums(operator, unknowns, vertices)
     of_sweep = None if swept is None else _of_sweep(operator, swept[operator.facet])
-    if isinstance(shape, CutDerivatives):
-        rows, load_by_shape = shape.rows, shape.force
-        if of_sweep is not None:
-            rows[..., :-1] += of_sweep.momentum
-            rows[..., -1:] += of_sweep.continuity
-        into = sums.with_flow(alpha * C + shape.operator, rows)
+    of_all, films = shape
+    if of_all is None:
+        by_shape, load_by_shape, rows = *shape_derivatives(operator, flow), []
     else:
-        by_shape, load_by_shape = shape_derivatives(operator, flow)
-        if shape is not None:
-            for part in (by_shape.fields, by_shape.psi, load_by_shape):
-                part[shape.pieces] = 0.0
-            load_by_shape[shape.pieces] += shape.force
-        into = sums.with_flow(alpha * C + by_shape, *(() if of_sweep is None else of_sweep.rows(operator)))
-        if shape is not None:
-            into = into + sums.of_films(shape)
+        by_shape, load_by_shape, rows = of_all.operator, of_all.force, list(of_all.rows)
+    if films is not None:
+        for part in (by_shape.fields, by_shape.psi, load_by_shape, *rows):
+            part[films.pieces] = 0.0
+        load_by_shape[films.pieces] += films.force
+    if of_sweep is not None:
+        of_facets = of_sweep.rows(operator)
+        rows = [part + more for part, more in zip(rows, of_facets, strict=True)] if rows else of_facets
+    into = sums.with_flow(alpha * C + by_shape, *rows)
     by_penalty = None
-    if isinstance(shape, FilmDerivatives) and shape.penalty is not None:
-        of_rows, by_penalty = sums.of_penalty(shape.pieces, shape.penalty)
-        into = into + of_rows
+    if films is not None:
+        into = into + sums.of_films(films)
+        if films.penalty is not None:
+            of_rows, by_penalty = sums.of_penalty(films.pieces, films.penalty)
+            into = into + of_rows
     if of_sweep is not None:
         load_by_shape = load_by_shape + of_sweep.force
     into.data[held[into.indices]] = 0.0
-    back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
+    back = sums.with_flow(operator.load)
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
     if by_penalty is not None:
         load = load + by_penalty

@@ -20,8 +20,9 @@ from solvers.fluid.cut.weights import Weights
 from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.terms import nitsche
-from solvers.fluid.terms.cell_blocks import CellBlocks, cell_blocks
-from solvers.fluid.terms.seepage import release, seepage_terms
+from solvers.fluid.terms.cell_blocks import CellBlocks, by_functions, cell_blocks
+from solvers.fluid.terms.seepage import release
+from solvers.fluid.terms.surface_terms import Piecewise, SurfaceOperators
 
 
 @dataclass(frozen=True)
@@ -53,15 +54,16 @@ class InterfaceTerms:
         unknowns: Unknowns,
         rule: Weights,
         cut: Cut,
+        operators: SurfaceOperators,
         mu: float | Array,
         penalty: Array,
         slip_length: Array | None = None,
         transmissivity: Array | None = None,
         slip_inertia: Array | None = None,
     ):
-        """mu [Pa s], by pieces if it varies; penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by
-        facets, None if zero.
+        """operators: of the terms of surfaces; mu [Pa s], by pieces if it varies; penalty: P by pieces [Pa s/m];
 
+        slip_length [m], transmissivity [m^3]: by facets, None if zero;
         slip_inertia: rho gamma_t h sum_k beta_k s_{n-k} at the corners of pieces [Pa], (pieces, dim), see
         `slip_history`; None: zero.
         """
@@ -74,8 +76,7 @@ class InterfaceTerms:
         self.dim, self._unknowns, self.vertices = grid.dim, unknowns, len(cut.motion.x)
         self.comm, self.periodic = grid.comm, unknowns.periodic
         moments = pieces.moments[mine][:, rule.order]
-        self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
-        self.full_penalty = self.penalty  #: P, where `penalty` becomes P R
+        self.n, self.mass_of_pieces, P = pieces.normal[mine], pieces.mass[mine], penalty[mine]
         self.cell, self.facet, self.corners = cells, facet, cut.facets[facet]
         self.x = cut.images.x[cut.images.facets[pieces.image[mine]]]
         self.sizes = grid.sizes[cells]
@@ -95,25 +96,27 @@ class InterfaceTerms:
         self.psi = np.tensordot(moments, psi, (1, 0)).transpose(0, 2, 1)
         area = pieces.area[mine][:, rule.order]
         self.pressure_slope = np.tensordot(area, psi_gradient, (1, 0)) / self.sizes[:, None, :]
-        self.coupling = MotionOperator(nitsche.stress(mu, self.n, self.penalty), self.n)  #: C
-        self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow
-        D, along = np.zeros_like(self.penalty), self.n[:, :, None] * self.n[:, None, :]
-        tangents = np.eye(self.dim) - along
-        self.mobility: Array | None = None  #: kappa / mu of a layer [m^3/Pa s]
+        D, along = np.zeros_like(P), self.n[:, :, None] * self.n[:, None, :]
+        tangents, mobility = np.eye(self.dim) - along, None
         if slip_length is not None:
-            D += nitsche.compliance(slip_length[facet] / mu, tangents, self.penalty)
+            D += nitsche.compliance(slip_length[facet] / mu, tangents, P)
         if transmissivity is not None:
-            mobility = self.mobility = transmissivity[facet] / mu
-            D += nitsche.compliance(release(mobility, self.sizes), along, self.penalty)
-            seeping = seepage_terms(tangents, area, psi_gradient, mobility, self.sizes)
-            self.cell_blocks.append(cell_blocks(cells, self.p, seeping))
-        self.released = D  #: D, zero without slip and layer
+            mobility = transmissivity[facet] / mu
+            D += nitsche.compliance(release(mobility, self.sizes), along, P)
+        self.surface = Piecewise(cells, self.n, P, D, mobility)
+        origin = grid.origins(cells)
+        by_g, leak, by_u, by_p = operators.motion(self.surface, origin)
+        self.coupling = MotionOperator(by_g, leak)  #: C
+        self.load = MotionOperator(by_u, by_p)  #: of the force by the flow, C^T S, transposed
+        self.penalty = -by_g[:, 0]  #: of the force by -g, P; with slip and a layer P R
+        self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow
         if slip_length is not None or transmissivity is not None:
-            own = nitsche.released(mu, self.n, self.penalty, D, area, rule.velocity_table, self.sizes)
-            self.cell_blocks.append(cell_blocks(cells, self.u, own))
-            R = np.eye(self.dim) - D @ self.penalty
-            self.coupling = MotionOperator(self.coupling.fields @ R[:, None], self.n)
-            self.penalty = self.penalty @ R
+            momentum, slopes = operators.beside(self.surface, origin)
+            parts = (self.u, rule.velocity_table, momentum), (self.p, rule.pressure_table, slopes)
+            self.cell_blocks = [
+                cell_blocks(cells, dofs, by_functions(area, functions, coefficients, self.sizes))
+                for dofs, functions, coefficients in parts
+            ]
 
     def at_corners(self, g: Array, of_facets: Array | None) -> Array:
         """Velocity [m/s] at the corners of pieces; g: of vertices, (vertices, dim); of_facets: added, (facets, dim)."""
@@ -121,12 +124,12 @@ class InterfaceTerms:
 
     def velocity_terms(self, g: Array, of_facets: Array | None = None) -> Array:
         """C g at local dofs, contributions to ghosts not added up; velocities [m/s] as in `at_corners`."""
-        g, fields, K = self.at_corners(g, of_facets), *self._flat()
+        g, fields, K = self.at_corners(g, of_facets), *self._flat(self.coupling)
         against = fields @ (g @ np.swapaxes(K, 1, 2)).reshape(len(g), fields.shape[2], self.dim)
         if self.slip_inertia is not None:
             of_slip = np.einsum("pav,pv->pa", self.fields[..., 0], self.slip_inertia)
             against -= (of_slip[..., None] * self.n[:, None]).reshape(against.shape)
-        leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, self.n))
+        leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, self.coupling.psi))
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
         return total + np.bincount(self.p.ravel(), leak.ravel(), size)
@@ -152,19 +155,19 @@ class InterfaceTerms:
 
     def _at_corners_of_pieces(self, flow: Array, g: Array) -> Array:
         """Force [N] at the corners of pieces with the velocities g there, (pieces, vertices, dim)."""
-        u, p, fields, K = flow[self.u], flow[self.p], *self._flat()
-        force: Array = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.n[:, None, :]
-        force -= (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], K.shape[1]) @ K
-        force -= self.mass_of_pieces @ g @ self.penalty
+        u, p, fields, K = flow[self.u], flow[self.p], *self._flat(self.load)
+        force: Array = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.load.psi[:, None, :]
+        force += (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], K.shape[1]) @ K
+        force -= self.mass_of_pieces @ g @ np.swapaxes(self.penalty, 1, 2)
         if self.slip_inertia is not None:
             force -= (self.mass_of_pieces @ self.slip_inertia[..., None]) * self.n[:, None]
         return force
 
-    def _flat(self) -> tuple[Array, Array]:
+    def _flat(self, operator: MotionOperator) -> tuple[Array, Array]:
         """`fields` (pieces, functions, vertices x fields) and coefficients (pieces, fields x component, motion)."""
         pieces, functions, vertices, fields = self.fields.shape  # a process may have no pieces: no -1 below
         flat = self.fields.reshape(pieces, functions, vertices * fields)
-        return flat, self.coupling.fields.reshape(pieces, fields * self.dim, self.dim)
+        return flat, operator.fields.reshape(pieces, fields * self.dim, self.dim)
 
     @property
     def mass_blocks(self) -> Array:

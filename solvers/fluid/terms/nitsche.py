@@ -33,9 +33,6 @@ from solvers.api import Array
 from solvers.fluid.settings.penalties import TRACE, Penalties
 from solvers.fluid.terms.forms import Coefficients, Expr, viscous_stress
 
-#: Pieces that are evaluated together. Arrays at their quadrature points are large in 3D.
-PIECES_AT_ONCE = 256
-
 
 def own(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand over cut cells of the flow's own block; `weights` has the moments of n and P as coefficients."""
@@ -55,11 +52,9 @@ def traction(flow: Coefficients, n: Expr, P: Expr, w: Expr, u: Expr) -> Expr:
     return dot(viscous_stress(flow, u), n) - dot(P, w)
 
 
-def at_compliant_surface(
-    flow: Coefficients, n: Expr, P: Expr, D: Expr, w: Expr, u: Expr, p: Expr, v: Expr, q: Expr
-) -> Expr:
-    """Integrand of `at_surface` and of -<D t(u, g), t(v, 0)>."""
-    return at_surface(flow, n, P, w, u, p, v, q) - dot(dot(D, traction(flow, n, P, w, u)), traction(flow, n, P, v, v))
+def released(flow: Coefficients, n: Expr, P: Expr, D: Expr, w: Expr, u: Expr, v: Expr) -> Expr:
+    """Integrand -<D t(u, g), t(v, 0)>."""
+    return -dot(dot(D, traction(flow, n, P, w, u)), traction(flow, n, P, v, v))
 
 
 def penalties(
@@ -100,55 +95,8 @@ def slip_mass(rho: float, factors: Penalties, n: Array, sizes: Array) -> Array:
     return mass
 
 
-def stress(mu: float | Array, n: Array, P: Array) -> Array:
-    """Coefficients K of the traction t for a velocity phi e_k: t_i = sum_f K[f, k, i] (phi, grad phi)_f.
-
-    mu [Pa s]; n: (pieces, dim); P: (pieces, dim, dim). Shape (pieces, 1 + dim, dim, dim).
-    """
-    identity = np.eye(n.shape[1])
-    slope = np.einsum("pj,ki->pjki", n, identity) + np.einsum("pk,ij->pjki", n, identity)
-    return np.concatenate([-P[:, None], np.reshape(mu, (-1, 1, 1, 1)) * slope], axis=1)
-
-
 def compliance(c: Array, projector: Array, P: Array) -> Array:
     """D [m/Pa s] for the compliance c [m/Pa s], (pieces,), in the directions of projectors (pieces, dim, dim)."""
     s = np.einsum("pij,pij->p", P, projector) / np.einsum("pii->p", projector)
     with np.errstate(divide="ignore"):
         return (1.0 / (1.0 / c + s))[:, None, None] * projector
-
-
-def released(
-    mu: float | Array, n: Array, P: Array, D: Array, area: Array, table: tuple[Array, Array], sizes: Array
-) -> Array:
-    """-<D t(u), t(v)> by pieces, shape (pieces, functions, dim, functions, dim); zero where D is zero.
-
-    area: int L_q, (pieces, points); table: values (points, functions) and reference gradients (points, functions, dim)
-    at these points; sizes: edge lengths of the cells [m], (pieces, dim).
-    """
-    functions, dim = table[0].shape[1], n.shape[1]
-    block = np.zeros((len(n), functions, dim, functions, dim))
-    gives, mu = np.flatnonzero(D.any(axis=(1, 2))), np.broadcast_to(mu, len(n))
-    for some in (gives[first : first + PIECES_AT_ONCE] for first in range(0, len(gives), PIECES_AT_ONCE)):
-        block[some] = _squares(mu[some], n[some], P[some], D[some], -area[some], table, sizes[some])
-    return block
-
-
-def _squares(mu: Array, n: Array, P: Array, D: Array, weight: Array, table: tuple[Array, Array], sizes: Array) -> Array:
-    """int weight t(phi_b e_l) . D t(phi_a e_k), shape (pieces, a, k, b, l).
-
-    t(phi_a e_k) = S_a e_k + n_k g_a with S_a = mu d_n phi_a - s phi_a and g_a = mu grad phi_a - s_n phi_a n.
-    """
-    dim, phi, grad = n.shape[1], table[0], mu[:, None, None, None] * table[1] / sizes[:, None, None, :]
-    s_total = np.einsum("pi,pij,pj->p", n, P, n)
-    s = (np.einsum("pii->p", P) - s_total) / (dim - 1)
-    S = np.einsum("pqai,pi->pqa", grad, n) - s[:, None, None] * phi
-    g = grad - ((s_total - s)[:, None] * n)[:, None, None, :] * phi[:, :, None]
-    pieces, points, functions = S.shape
-    Dg = (g.reshape(pieces, -1, dim) @ D).reshape(g.shape)
-    weighted = np.swapaxes(weight[:, :, None] * S, 1, 2)
-    mixed = (weighted @ Dg.reshape(pieces, points, -1)).reshape(pieces, functions, functions, dim)
-    both = sum(np.swapaxes(weight[:, :, None] * g[..., i], 1, 2) @ Dg[..., i] for i in range(dim))
-    block = np.einsum("pab,pkl->pakbl", weighted @ S, D) + np.einsum("pab,pk,pl->pakbl", both, n, n)
-    block += np.einsum("pabk,pl->pakbl", mixed, n)
-    block += np.einsum("pbal,pk->pakbl", mixed, n)
-    return block

@@ -11,7 +11,6 @@ Source of the layer: Frei, Gerosa, Burman, Fernandez, Comput. Methods Appl. Mech
 
 from __future__ import annotations
 
-import numpy as np
 from ufl import dot, grad
 
 from solvers.api import Array
@@ -32,15 +31,3 @@ def release(mobility: Array, sizes: Array) -> Array:
 def layer(mobility: Expr, n: Expr, p: Expr, q: Expr) -> Expr:
     """Integrand kappa / mu grad_t p . grad_t q."""
     return mobility * (dot(grad(p), grad(q)) - dot(grad(p), n) * dot(grad(q), n))
-
-
-def seepage_terms(tangents: Array, area: Array, gradient: Array, mobility: Array, sizes: Array) -> Array:
-    """<kappa / mu grad_t psi_b, grad_t psi_a> by pieces, shape (pieces, functions, functions).
-
-    tangents: I - n n^T, (pieces, dim, dim); area: int L_q, (pieces, points); gradient: of the pressure's shape
-    functions in the reference cell at these points (points, functions, dim); the others as in `release`.
-    """
-    T = tangents * mobility[:, None, None] / (sizes[:, :, None] * sizes[:, None, :])
-    pairs = np.einsum("qai,qbj->qaibj", gradient, gradient)
-    block: Array = np.einsum("paibj,pij->pab", np.tensordot(area, pairs, (1, 0)), T)
-    return block

@@ -65,8 +65,7 @@ def film_derivatives(
     pieces = np.flatnonzero(cut.creeping[number])
     if not len(pieces):
         return None
-    index = np.unravel_index(number[pieces], grid.grid.shape, order="F")
-    origin = np.stack([edge[i] for edge, i in zip(grid.grid.edges, index, strict=True)], axis=1)
+    origin = grid.origins(at.cell[pieces])
     sides = open_sides(grid.grid, number[pieces], cut.creeping)
     blocks, by_penalty = [], []
     for first in range(0, len(pieces), FILM_PIECES_AT_ONCE):

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
-from solvers.fluid.terms import forms, nitsche
+from solvers.fluid.terms import forms
 from solvers.fluid.terms.interface import InterfaceTerms
-from solvers.fluid.terms.seepage import layer
 from solvers.fluid.terms.shape_derivatives.film_crossings import barycentric
+from solvers.fluid.terms.surface_terms import Piecewise, along_normal, side_by_side, surface, symbols
 
 #: Numbers of a piece beside its normal: s and s_n of `nitsche.penalties`, the traction of slip in earlier steps, D
 #: along the normal and along the surface, and kappa / mu of a layer, which alone does not change as surfaces move.
@@ -36,7 +36,7 @@ class FilmIntegrands:
     def _built(self) -> tuple[Any, fem.Pointwise, fem.Pointwise]:
         """(numbers of pieces, rows, force)."""
         domain, flow, (u, p, v, q), dim = self._domain, self._flow, self._parts, self._domain.dim
-        numbers, (n, parameters, origin, g, slope, force, zero) = _symbols(
+        numbers, (n, parameters, origin, g, slope, force, zero) = symbols(
             domain, (dim,), (PARAMETERS,), (dim,), (dim,), (dim, dim), (dim,), (1,)
         )
         n, force, parameters = ufl.variable(n), ufl.variable(force), ufl.variable(parameters)
@@ -62,8 +62,14 @@ class FilmIntegrands:
         ends = np.concatenate([np.zeros((1, dim)), np.eye(dim)])
         there = barycentric(origin[:, None] + ends * sizes[:, None], at.x[some]) @ g
         slope = np.swapaxes(there[:, 1:] - there[:, :1], 1, 2) / sizes[:, None]
-        numbers = [*_numbers(at, some, np.zeros(len(g))), origin, there[:, 0], slope, np.zeros((len(g), dim + 1))]
-        rows, force = (part.on(at.cell[some], {symbols: _beside(numbers)}) for part in parts)
+        numbers = [
+            *_numbers(at.surface, some, np.zeros(len(g))),
+            origin,
+            there[:, 0],
+            slope,
+            np.zeros((len(g), dim + 1)),
+        ]
+        rows, force = (part.on(at.cell[some], {symbols: side_by_side(numbers)}) for part in parts)
         return rows, force.reshape(*rows.shape[:3], dim)
 
 
@@ -79,7 +85,7 @@ class MeanIntegrands:
         """(numbers of pieces, the derivatives)."""
         domain, flow, dim = self._domain, self._flow, self._domain.dim
         vector, tensor = (dim,), (dim, dim)
-        numbers, (n, parameters, x, w, p, du, dp, tests, dv) = _symbols(
+        numbers, (n, parameters, x, w, p, du, dp, tests, dv) = symbols(
             domain, vector, (PARAMETERS,), vector, vector, (1,), tensor, vector, (2 * dim + 1,), tensor
         )
         n, parameters, tests, dv = (ufl.variable(part) for part in (n, parameters, tests, dv))
@@ -102,9 +108,15 @@ class MeanIntegrands:
         """
         pieces, dim = origin.shape
         parts, tests = 2 * dim + PARAMETERS, 2 * dim + 1
-        numbers = [*_numbers(at, slice(None), inertia), origin, means, slopes, np.zeros((pieces, tests + dim**2))]
+        numbers = [
+            *_numbers(at.surface, slice(None), inertia),
+            origin,
+            means,
+            slopes,
+            np.zeros((pieces, tests + dim**2)),
+        ]
         symbols, pointwise = self._built
-        found = pointwise.on(at.cell, {symbols: _beside(numbers)})[:, 0]
+        found = pointwise.on(at.cell, {symbols: side_by_side(numbers)})[:, 0]
         return (
             found[:, : parts * tests].reshape(pieces, parts, tests),
             found[:, parts * tests :].reshape(pieces, dim, dim, dim),
@@ -116,8 +128,15 @@ def _surface(flow: forms.Coefficients, n: Any, parameters: Any, w: Any, u: Any, 
     s, s_n, inertia, d_n, d_t, mobility = (parameters[k] for k in range(PARAMETERS))
     along, identity = ufl.outer(n, n), ufl.Identity(len(n))
     P, D = s * identity + s_n * along, d_n * along + d_t * (identity - along)
-    terms = nitsche.at_compliant_surface(flow, n, P, D, w, u, p, v, q) - inertia * ufl.dot(n, v)
-    return terms + layer(mobility, n, p, q)
+    return surface(flow, n, P, D, mobility, w, u, p, v, q) - inertia * ufl.dot(n, v)
+
+
+def _numbers(at: Piecewise, some: NDArray[np.int64] | slice, inertia: Array) -> list[Array]:
+    """Normals and parameters of some pieces."""
+    n = at.n[some]
+    (s_total, s), (d_n, d_t) = (along_normal(part[some], n) for part in (at.penalty, at.released))
+    mobility = np.zeros(len(n)) if at.mobility is None else at.mobility[some]
+    return [n, np.stack([s, s_total - s, inertia, d_n, d_t, mobility], axis=1)]
 
 
 def _moved(f: Any, n: Any, frozen: tuple[Any, Any] | None = None, parameters: Any = None) -> list[Any]:
@@ -144,34 +163,3 @@ def _by_penalty(f: Any, parameters: Any) -> list[Any]:
         by = ufl.diff(part, parameters)
         found.append(by[0] - parameters[3] ** 2 * by[3] - parameters[4] ** 2 * by[4])
     return found
-
-
-def _symbols(domain: fem.Domain, *shapes: tuple[int, ...]) -> tuple[Any, list[Any]]:
-    """(numbers of cells, vectors and matrices of them)."""
-    ends = np.cumsum([0, *(np.prod(shape) for shape in shapes)])
-    numbers, found = fem.numbers_of_cells(domain, int(ends[-1])), []
-    for shape, first in zip(shapes, ends.tolist(), strict=False):
-        if len(shape) == 1:
-            found.append(ufl.as_vector([numbers[first + i] for i in range(shape[0])]))
-        else:
-            rows = range(first, first + shape[0] * shape[1], shape[1])
-            found.append(ufl.as_matrix([[numbers[row + j] for j in range(shape[1])] for row in rows]))
-    return numbers, found
-
-
-def _numbers(at: InterfaceTerms, some: NDArray[np.int64] | slice, inertia: Array) -> list[Array]:
-    """Normals and parameters of some pieces."""
-    n = at.n[some]
-    (s_total, s), (d_n, d_t) = (along_normal(part[some], n) for part in (at.full_penalty, at.released))
-    mobility = np.zeros(len(n)) if at.mobility is None else at.mobility[some]
-    return [n, np.stack([s, s_total - s, inertia, d_n, d_t, mobility], axis=1)]
-
-
-def along_normal(values: Array, n: Array) -> tuple[Array, Array]:
-    """a and b of matrices a n n^T + b (I - n n^T), (pieces, dim, dim)."""
-    normal = np.einsum("pk,pkl,pl->p", n, values, n)
-    return normal, (np.einsum("pkk->p", values) - normal) / (n.shape[1] - 1)
-
-
-def _beside(numbers: list[Array]) -> Array:
-    return np.concatenate([part.reshape(len(part), int(np.prod(part.shape[1:]))) for part in numbers], axis=1)
