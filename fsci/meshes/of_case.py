@@ -76,7 +76,7 @@ def read_body(case: Case, name: str) -> Mesh:
     try:
         mesh = _elastic_mesh(case, name, settings.mesh)
         _require_dimension(case, name, mesh)
-        # bodies that may touch in a flow have first order: there plates of tied halves of second order are wrong
+        # bodies that may touch in a flow have first order: second-order ones get the pressure as on linear facets there
         if chooses_order(settings.mesh) and name not in bodies_that_may_touch(case) and is_slender(mesh):
             mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
