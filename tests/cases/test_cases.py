@@ -43,6 +43,7 @@ SMALLER = {
         "fluid.grid.x=[{to: 0.8, cells: 6, ratio: 0.4}, {to: 1.5, cells: 12}, {to: 8, cells: 20, ratio: 15}]",
         "fluid.grid.y=[{to: 1, cells: 16}]",
     ],
+    "segre_silberberg": ["fluid.grid.cells=[24, 24]"],
     "hopper": ["fluid.grid.cells=[20, 32]", "solver.newton.residual=1e-15"],  # the leak sees what the iteration leaves
     "elastic_tube": ["fluid.grid.cells=[4, 4, 16]", "structure.bodies.wall.mesh.cells=[8, 1, 20]"],
     "falling_sphere": [
@@ -74,7 +75,8 @@ PARALLEL = (
 #: what the whole runs of cases take, where it is long [s]
 SECONDS = {
     "cavity_flexible_bottom": 55, "cylinder_2d2": 200, "elastic_tube": 90, "falling_elastic_disc": 200, "flap": 90,
-    "jeffery_orbit": 70, "leaflet_pulsating": 300, "torus_rough": 150, "torus_wall": 65, "two_tori_friction": 80,
+    "jeffery_orbit": 70, "leaflet_pulsating": 300, "segre_silberberg": 90, "torus_rough": 150,
+    "torus_wall": 65, "two_tori_friction": 80,
 }  # fmt: skip
 
 
