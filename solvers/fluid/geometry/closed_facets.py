@@ -24,9 +24,8 @@ def without_closed(moments, facets: Indices, x: Array, closing: NDArray[np.bool_
     moments: of `kernels.moments`; x: vertices [m]; closing: mask of the facets that may lie on others; flush: distance
     [m] that is rounding.
     """
-    with_fluid = moments.fraction < 1.0 - NOTHING
     cell = moments.cells[moments.piece_cell]
-    some = np.flatnonzero(with_fluid[cell])
+    some = _with_facing(moments, cell, area_vectors(x[facets])[moments.piece_facet])
     first, second = _pairs(cell[some], closing[moments.piece_facet[some]])
     corners = x[facets[moments.piece_facet[some]]]
     vectors = area_vectors(corners)
@@ -44,6 +43,19 @@ def without_closed(moments, facets: Indices, x: Array, closing: NDArray[np.bool_
     np.subtract.at(mass, second, np.swapaxes(there, 1, 2) @ moments.piece_mass[first] @ there)
     pieces = (moments.piece_cell, moments.piece_facet, found, mass)
     return Moments(moments.fraction, moments.cells, moments.solid, *(part[kept] for part in pieces))
+
+
+def _with_facing(moments, cell: Indices, vectors: Array) -> Indices:
+    """Numbers of the pieces in cells with fluid and surfaces that face each other; vectors: of their facets [m^(d-1)].
+
+    Of two pieces with opposite normals one does not look along the sum of the normals in the cell.
+    """
+    area, size = moments.piece_mass.sum(axis=(1, 2)), np.linalg.norm(vectors, axis=1)
+    share = np.divide(area, size, out=np.zeros_like(area), where=size > 0.0)
+    net = np.stack([np.bincount(cell, share * part, len(moments.fraction)) for part in vectors.T], axis=1)
+    facing = np.zeros(len(moments.fraction), dtype=bool)
+    facing[cell[np.einsum("ni,ni->n", vectors, net[cell]) <= 0.0]] = True
+    return np.flatnonzero((facing & (moments.fraction < 1.0 - NOTHING))[cell])
 
 
 def _pairs(cell: Indices, closing: NDArray[np.bool_]) -> tuple[Indices, Indices]:
