@@ -59,7 +59,7 @@ def without_shape(monkeypatch):
         return 0.0 * into_flow, 0.0 * load
 
     monkeypatch.setattr(coupling_entries, "shape_derivatives", without)
-    monkeypatch.setattr(FlowSystem, "shape_derivatives", lambda *_, **__: None)
+    monkeypatch.setattr(FlowSystem, "shape_derivatives", lambda *_, **__: (None, None))
 
 
 def split(scheme, rows_of_both) -> tuple[np.ndarray, np.ndarray]:

@@ -103,7 +103,7 @@ def test_blocks_against_finite_differences(monkeypatch):
         return 0.0 * into_flow, 0.0 * load
 
     monkeypatch.setattr(coupling_entries, "shape_derivatives", without)
-    monkeypatch.setattr(FlowSystem, "shape_derivatives", lambda *_, **__: None)
+    monkeypatch.setattr(FlowSystem, "shape_derivatives", lambda *_, **__: (None, None))
     matrix = scheme.blocks().assembled()
     flow, h = fluid.flow.copy(), 1e-6
     du, dw = rng.standard_normal(3), np.where(fluid.iterate.held, 0.0, rng.standard_normal(fluid.size))

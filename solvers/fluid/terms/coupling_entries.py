@@ -54,9 +54,11 @@ def interface_entries(
         for part in (by_shape.fields, by_shape.psi, load_by_shape, *rows):
             part[films.pieces] = 0.0
         load_by_shape[films.pieces] += films.force
-    if of_sweep is not None:
-        of_facets = of_sweep.rows(operator)
-        rows = [part + more for part, more in zip(rows, of_facets, strict=True)] if rows else of_facets
+    if of_sweep is not None and rows:
+        rows[0][..., : operator.dim] += of_sweep.momentum
+        rows[-1][..., -1:] += of_sweep.continuity
+    elif of_sweep is not None:
+        rows = of_sweep.rows(operator)
     into = sums.with_flow(alpha * C + by_shape, *rows)
     by_penalty = None
     if films is not None:

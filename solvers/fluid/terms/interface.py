@@ -112,7 +112,9 @@ class InterfaceTerms:
         self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow
         if slip_length is not None or transmissivity is not None:
             momentum, slopes = operators.beside(self.surface, origin)
-            parts = (self.u, rule.velocity_table, momentum), (self.p, rule.pressure_table, slopes)
+            parts = [(self.u, rule.velocity_table, momentum)]
+            if mobility is not None:
+                parts.insert(0, (self.p, rule.pressure_table, slopes))
             self.cell_blocks = [
                 cell_blocks(cells, dofs, by_functions(area, functions, coefficients, self.sizes))
                 for dofs, functions, coefficients in parts

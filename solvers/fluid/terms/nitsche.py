@@ -11,7 +11,7 @@ With t(u, g) = 2 mu eps(u) n - P (u - g) they read
         + <g, t(v, 0) + q n>                                C
         + <t(u, g) - p n, h>                                less the force on the surface: C^T, the mass <P g, h>
 
-Hence every operator of the surface (`interface.InterfaceTerms`) follows from P and the coefficients of t, `stress`.
+Hence every operator of the surface (`interface.InterfaceTerms`) is a part of N's derivatives, `surface_terms`.
 
 Compliant conditions, u - g = -c t in the directions of a projector, describe slip along the surface (c = b / mu with
 the slip length b) and seepage into it. They need one more term, -<D t(u, g), t(v, -h)> with D = projector / (1 / c + s)

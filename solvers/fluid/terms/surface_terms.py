@@ -56,10 +56,10 @@ class SurfaceOperators:
         """(numbers, variables u, grad u, p, grad p, g, v, grad v, q, grad q, arguments of `surface`)."""
         domain, dim = self._domain, self._domain.dim
         vector, tensor = (dim,), (dim, dim)
-        of_pieces = vector, vector, tensor, tensor, (1,)
+        numbers, (origin, n, P, D, mobility) = symbols(domain, vector, vector, tensor, tensor, (1,))
+        # the second derivative is the same at any fields
         of_fields = vector, tensor, (1,), vector, vector, vector, tensor, (1,), vector
-        numbers, (origin, n, P, D, mobility, *fields) = symbols(domain, *of_pieces, *of_fields)
-        u, du, p, dp, g, v, dv, q, dq = variables = [ufl.variable(part) for part in fields]
+        u, du, p, dp, g, v, dv, q, dq = variables = [ufl.variable(ufl.zero(*shape)) for shape in of_fields]
         away = ufl.SpatialCoordinate(domain.mesh) - origin
         at, test = u + ufl.dot(du, away), v + ufl.dot(dv, away)
         flow = [at - g, at, p[0] + ufl.dot(dp, away), test, q[0] + ufl.dot(dq, away)]
@@ -113,10 +113,8 @@ class SurfaceOperators:
         return momentum.reshape(pieces, 1 + dim, dim, 1 + dim, dim), of_p
 
     def _on(self, built: tuple[Any, fem.Pointwise], at: Piecewise, origin: Array) -> Array:
-        pieces, dim = origin.shape
-        mobility = np.zeros(pieces) if at.mobility is None else at.mobility
-        fields = np.zeros((pieces, 2 * (dim + dim**2 + 1 + dim) + dim))
-        numbers = side_by_side([origin, at.n, at.penalty, at.released, mobility[:, None], fields])
+        mobility = np.zeros(len(origin)) if at.mobility is None else at.mobility
+        numbers = side_by_side([origin, at.n, at.penalty, at.released, mobility[:, None]])
         found: Array = built[1].on(at.cell, {built[0]: numbers})[:, 0]
         return found
 
