@@ -9,7 +9,7 @@ import numpy as np
 
 from fsci.case import Case
 from fsci.case.material import OwnLawSection
-from fsci.meshes.of_case import chooses_order, is_meshed_here
+from fsci.case.solid_order import is_meshed_here
 from fsci.meshes.slender import bending_error
 from solvers.api import Array
 from solvers.mesh.cell_types import CELL_TYPES
@@ -35,7 +35,7 @@ class ChosenElement:
     """The element of a body, and what to say of it."""
 
     element: Formulation
-    notes: tuple[str, ...] = ()  #: that the program has chosen the mixed one, or cells of second order
+    notes: tuple[str, ...] = ()  #: that the program has chosen the mixed one
     warnings: tuple[str, ...] = ()  #: that its cells lock
 
 
@@ -43,8 +43,6 @@ def choose_element(case: Case, name: str, mesh: Mesh) -> ChosenElement:
     """The element of a body with this mesh: what its case says, else by Poisson's ratio. Raises CaseError."""
     settings, kind = case.elastic_bodies[name], CELL_TYPES[mesh.cell_type]
     notes, warnings = [], []
-    if chooses_order(settings.mesh) and kind.degree > 1:
-        notes.append("cells of second order, since it is slender")
     nu = None if settings.element == "mixed" else nearly_incompressible(case, name, mesh)
     mixed = settings.element == "mixed" or (nu is not None and settings.element == "auto" and not kind.shape.simplex)
     if nu is not None and mixed:

@@ -34,7 +34,7 @@ class FileMesh(PlacedMesh):
     order: Order = setting(
         "auto",
         "polynomial order of the cells (.geo, and with 'thickness'; other files have theirs); auto: 2 for an elastic "
-        "body that is slender, so that it bends, unless it may touch in a flow, else 1",
+        "body, but 1 where it may touch in a flow, or slides with friction and is not slender",
     )
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
     size_factor: Positive = setting(

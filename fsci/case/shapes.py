@@ -78,8 +78,8 @@ class ShapeSection(PlacedMesh):
     takes: ClassVar[Mapping[str, Takes]]
     order: Order = setting(
         "auto",
-        "polynomial order of the cells; auto: 2 for an elastic body that is slender, so that it bends, unless it "
-        "may touch something in a flow, else 1",
+        "polynomial order of the cells; auto: 2 for an elastic body, but 1 where it may touch something in a flow, or "
+        "slides with friction and is not slender",
     )
     if TYPE_CHECKING:
         shape: str
@@ -88,7 +88,7 @@ class ShapeSection(PlacedMesh):
 
     @property
     def degree(self) -> int:
-        """Of the cells, unless the body turns out to be slender."""
+        """Of the cells; `with_order` has that of elastic bodies."""
         return 1 if self.order == "auto" else self.order
 
     @property

@@ -12,6 +12,7 @@ from fsci.case.fluid import FluidSection
 from fsci.case.mesh import Mesh
 from fsci.case.probe_checks import CONTACT_COLUMNS, FRICTION_COLUMNS, known_columns
 from fsci.case.shapes import ShapeSection
+from fsci.case.solid_order import with_order
 from fsci.case.structure import StructureSection
 from fsci.meshes.nested import cells_of, fluid_dofs
 from solvers.mesh.cell_types import CELL_TYPES
@@ -95,26 +96,26 @@ def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, Bod
     yield "structure", motion + (f", plane {structure.plane}" if dimension == 2 else "")
     for name, body in structure.bodies.items():
         text = f"{_name(body.mesh)}, {body.material.law}"
-        if isinstance(body.mesh, ShapeSection):
-            order = CELL_TYPES[meshes[name].cell_type].degree if name in meshes else body.mesh.order
-            text += f", {_count(body.mesh.plan.counts[0], 'cell')} (order {order} {body.mesh.cell})"
+        if isinstance(chosen := with_order(case, name), ShapeSection):
+            order = CELL_TYPES[meshes[name].cell_type].degree if name in meshes else chosen.order
+            text += f", {_count(chosen.plan.counts[0], 'cell')} (order {order} {chosen.cell})"
         elif name in meshes:
             mesh = meshes[name]
             text += f", {_count(len(mesh.cells), 'cell')} ({mesh.cell_type})"
         yield f"body {name}", text
-    dofs = structure_dofs(structure, meshes)
+    dofs = structure_dofs(case, meshes)
     if dofs is not None:
         yield "dofs", f"{dofs:,}"
 
 
-def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) -> int | None:
+def structure_dofs(case: Case, meshes: Mapping[str, BodyMesh]) -> int | None:
     """Unknowns of all elastic bodies; None if a mesh file cannot be read."""
     total = 0
-    for name, body in structure.bodies.items():
+    for name in case.elastic_bodies:
         if name in meshes:
             total += meshes[name].points.size
-        elif isinstance(body.mesh, ShapeSection):
-            total += body.mesh.plan.counts[1] * body.mesh.plan.dimension
+        elif isinstance(mesh := with_order(case, name), ShapeSection):
+            total += mesh.plan.counts[1] * mesh.plan.dimension
         else:
             return None
     return total

@@ -68,7 +68,7 @@ def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
 
 
 def _cost(case: Case, meshes: Mapping[str, Mesh]) -> Cost | None:
-    structure = None if case.structure is None else structure_dofs(case.structure, meshes)
+    structure = None if case.structure is None else structure_dofs(case, meshes)
     dimension = next((mesh.points.shape[1] for mesh in meshes.values()), None)
     return estimate(case, structure, costs(), dimension)
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.case.checks import VECTORS, vectors_of
-from fsci.case.flow_element import bodies_that_may_touch
 from fsci.case.free_checks import free_mistakes
 from fsci.case.mesh import FileMesh
 from fsci.case.mesh import Mesh as MeshSection
+from fsci.case.solid_order import chooses_order, with_order
 from fsci.case.structure import NO_MIXED_SIMPLICES
 from fsci.meshes.checksum import mesh_checksum
 from fsci.meshes.finite_values import require_finite
@@ -74,11 +74,10 @@ def read_body(case: Case, name: str) -> Mesh:
     settings = case.elastic_bodies[name]
     keys: Keys = ("structure", "bodies", name, "mesh")
     try:
-        mesh = _elastic_mesh(case, name, settings.mesh)
+        mesh = _elastic_mesh(case, name, with_order(case, name))
         _require_dimension(case, name, mesh)
-        # bodies that may touch in a flow have first order: second-order ones get the pressure as on linear facets there
-        if chooses_order(settings.mesh) and name not in bodies_that_may_touch(case) and is_slender(mesh):
-            mesh = _elastic_mesh(case, name, settings.mesh.model_copy(update={"order": 2}))
+        if CELL_TYPES[mesh.cell_type].degree == 1 and chooses_order(settings.mesh) and is_slender(mesh):
+            mesh = _elastic_mesh(case, name, with_order(case, name, slender=True))
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
             keys = ("structure", "bodies", name, "element")
@@ -93,16 +92,6 @@ def read_body(case: Case, name: str) -> Mesh:
     _check_lengths(case, name, mesh.points.shape[1])
     require_finite(case, name, mesh, find_locations(case, name, mesh))
     return mesh
-
-
-def is_meshed_here(mesh: MeshSection) -> bool:
-    """Whether the case may say the order of the cells: no file has it."""
-    return not isinstance(mesh, FileMesh) or mesh.thickness is not None or mesh.file.endswith(".geo")
-
-
-def chooses_order(mesh: MeshSection) -> bool:
-    """Whether the program chooses the order of the cells of an elastic body."""
-    return mesh.order == "auto" and is_meshed_here(mesh)
 
 
 def degree_of_cells(case: Case, name: str) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 from fsci.case import Case
 from fsci.case.flow_element import flow_element
 from fsci.case.shapes import ShapeSection
+from fsci.case.solid_order import with_order
 from fsci.case.yaml_text import Keys
 
 #: Memory [bytes] that an unknown takes at least: its row of a matrix in 2D with its nine neighbours, twice. In 3D with
@@ -21,9 +22,9 @@ MOST_UNKNOWNS = 2**31 - 1
 def unknowns(case: Case) -> dict[Keys, int]:
     """Setting that determines the count -> unknowns, as far as no mesh file is needed."""
     found: dict[Keys, int] = {}
-    for name, body in case.elastic_bodies.items():
-        if isinstance(body.mesh, ShapeSection):
-            found["structure", "bodies", name, "mesh"] = body.mesh.plan.counts[1] * body.mesh.plan.dimension
+    for name in case.elastic_bodies:
+        if isinstance(mesh := with_order(case, name), ShapeSection):
+            found["structure", "bodies", name, "mesh"] = mesh.plan.counts[1] * mesh.plan.dimension
     if case.fluid is not None:
         found["fluid", "grid"] = case.fluid.dofs(flow_element(case).degree)
     return found

@@ -119,7 +119,8 @@ def _facets(case: Case) -> Iterator[Twin]:
 
 def _orders_of_cells(case: Case) -> Iterator[Twin]:
     """Bodies of first order from scripts and built-in shapes get cells of second order; other files have their own."""
-    from fsci.meshes.of_case import chooses_order, degree_of_cells
+    from fsci.case.solid_order import chooses_order
+    from fsci.meshes.of_case import degree_of_cells
 
     settings = tuple(
         (f"structure.bodies.{name}.mesh.order", "2")

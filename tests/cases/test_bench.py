@@ -252,7 +252,7 @@ own:
   case: *block
   exact: {top.y final: 0.01}
   variants:
-    option: {quad4: {}, quad9: {structure.bodies.block.mesh.order: 2}}
+    option: {quad4: {structure.bodies.block.mesh.order: 1}, quad9: {structure.bodies.block.mesh.order: 2}}
     n: [1, 2]
     resolution: {"{n} x {2*n}": {}}
 

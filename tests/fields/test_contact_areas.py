@@ -12,11 +12,11 @@ time: {step: 0.25, end: 1}
 structure:
   bodies:
     low:
-      mesh: {shape: rectangle, size: [2, 1], cells: [7, 2], origin: [-0.57, 0]}
+      mesh: {shape: rectangle, size: [2, 1], cells: [7, 2], order: 1, origin: [-0.57, 0]}
       material: {law: st_venant_kirchhoff, E: 1e6, nu: 0}
       supports: [{on: bottom, displacement: [0, 0]}]
     high:
-      mesh: {shape: rectangle, size: [1, 1], cells: [5, 2], origin: [0, 1.0015]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [5, 2], order: 1, origin: [0, 1.0015]}
       material: {law: st_venant_kirchhoff, E: 1e6, nu: 0}
       supports: [{on: top, displacement: [0, "-0.004*t"]}]
 contact:

@@ -34,11 +34,11 @@ structure:
   dynamics: {rho_inf: 1}
   bodies:
     base:
-      mesh: {shape: rectangle, size: [4, 1], cells: [12, 3], origin: [0, -1]}
+      mesh: {shape: rectangle, size: [4, 1], cells: [12, 3], order: 1, origin: [0, -1]}
       material: {law: neo_hooke, E: 500, nu: 0.3, density: 0.1}
       supports: [{on: bottom, displacement: [0, 0]}]
     block:
-      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], origin: [0.5, 0.001]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], order: 1, origin: [0.5, 0.001]}
       material: {law: neo_hooke, E: 500, nu: 0.3, density: 0.1}
       supports: [{on: top, displacement: ["0.75*max(t - 1, 0)^2", "-0.3*min(t, 1)^2*(3 - 2*min(t, 1))"]}]
 contact:
@@ -108,7 +108,7 @@ structure:
   dynamics: {rho_inf: 0.8}
   bodies:
     block:
-      mesh: {shape: box, size: [1, 1, 1], cells: [2, 2, 3]}
+      mesh: {shape: box, size: [1, 1, 1], cells: [2, 2, 3], order: 1}
       material: {law: neo_hooke, E: 2000, nu: 0.3, density: 1.0}
       initial_velocity: [0, 0, -5]
 contact:

@@ -13,11 +13,11 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     small:
-      mesh: {shape: box, size: [1, 1, 1], cells: [1, 1, 1], translate: [1, 1, 1]}
+      mesh: {shape: box, size: [1, 1, 1], cells: [1, 1, 1], order: 1, translate: [1, 1, 1]}
       material: {law: neo_hooke, E: 1000, nu: 0.3}
       supports: [{on: top, displacement: [0, 0, -0.02]}]
     big:
-      mesh: {shape: box, size: [3, 3, 1], cells: [6, 6, 2]}
+      mesh: {shape: box, size: [3, 3, 1], cells: [6, 6, 2], order: 1}
       material: {law: neo_hooke, E: 1000, nu: 0.3}
       supports: [{on: bottom, displacement: [0, 0, 0]}]
 contact:
@@ -34,7 +34,7 @@ structure:
   dynamics: {rho_inf: 0.9}
   bodies:
     one:
-      mesh: {shape: box, size: [1, 1, 1], cells: [1, 1, 1]}
+      mesh: {shape: box, size: [1, 1, 1], cells: [1, 1, 1], order: 1}
       material: {law: neo_hooke, E: "1000*(1 + x)", nu: 0.3, density: "1 + 0.1*x"}
       supports: [{on: [bottom, front], symmetry: true}, {on: left, displacement: [0, null, null]}]
       gravity: [0, 0, -1]

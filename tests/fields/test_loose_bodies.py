@@ -313,7 +313,7 @@ structure:
   dynamics: {rho_inf: 0.9}
   bodies:
     block:
-      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3], order: 1}
       material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
       initial_velocity: [4, 0]
 rigid:

@@ -13,13 +13,13 @@ time: {step: 0.125, end: 1.0}
 structure:
   bodies:
     block:
-      mesh: {shape: box, size: [1, 1, 1], cells: [3, 3, 3]}
+      mesh: {shape: box, size: [1, 1, 1], cells: [3, 3, 3], order: 1}
       material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1.0}
       supports: [{on: bottom, displacement: [0, 0, 0]}]
 contact:
   obstacles:
     plate:
-      mesh: {shape: box, size: [3, 3, 1], cells: [1, 1, 1], translate: [-1, -1, 1.01]}
+      mesh: {shape: box, size: [3, 3, 1], cells: [1, 1, 1], order: 1, translate: [-1, -1, 1.01]}
       on: bottom
       motion: ["0.05*t", "0.1*t", "-0.2*sin(2*pi*t)^2"]
   pairs:
@@ -40,11 +40,11 @@ structure:
   dynamics: {rho_inf: 1.0}
   bodies:
     left:
-      mesh: {shape: rectangle, size: [1, 1], cells: [3, 4]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 4], order: 1}
       material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1.0}
       initial_velocity: [3, 0.5]
     right:
-      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3], cell: tri, translate: [1.2, 0.3]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3], order: 1, cell: tri, translate: [1.2, 0.3]}
       material: {law: neo_hooke, E: 500, nu: 0.3, density: 2.0}
       initial_velocity: [-1, 0]
 contact:
@@ -69,7 +69,7 @@ structure:
   plane: strain
   bodies:
     block:
-      mesh: {shape: rectangle, size: [1, 1], cells: [3, 2]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 2], order: 1}
       material: {law: st_venant_kirchhoff, E: 1000, nu: 0.25}
       supports:
         - {on: [left, right], symmetry: true}

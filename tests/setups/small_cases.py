@@ -6,7 +6,7 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     block:
-      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1], order: 1}
       material: {law: neo_hooke, E: 1, nu: 0}
       supports: [{on: left, displacement: [0, 0]}]
 """
@@ -17,7 +17,7 @@ time: {step: 0.2, end: 1}
 structure:
   bodies:
     plate:
-      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2], order: 1}
       material: {law: neo_hooke, E: 1, nu: 0.3}
       supports: [{on: left, displacement: [0, 0]}]
       body_force: [0, "1e-6*t"]

@@ -6,7 +6,7 @@ structure:
   dynamics: {rho_inf: 0.9}
   bodies:
     beam:
-      mesh: {shape: rectangle, size: [2, 0.5], cells: [22, 2]}
+      mesh: {shape: rectangle, size: [2, 0.5], cells: [22, 2], order: 1}
       material: {law: neo_hooke, E: 100, nu: 0.3, density: 1}
       supports: [{on: left, displacement: [0, 0]}]
       gravity: [0, "-3*sin(3*t)"]
@@ -18,7 +18,7 @@ structure:
   dynamics: {rho_inf: 0.9}
   bodies:
     block:
-      mesh: {shape: rectangle, size: [1, 0.5], cells: [8, 4], origin: [0, 0.001]}
+      mesh: {shape: rectangle, size: [1, 0.5], cells: [8, 4], order: 1, origin: [0, 0.001]}
       material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
       gravity: [0, -10]
 contact:
@@ -52,7 +52,7 @@ structure:
   dynamics: {rho_inf: 0.8}
   bodies:
     post:
-      mesh: {shape: rectangle, size: [0.23, 0.41], origin: [0.62, 0], cells: [3, 5]}
+      mesh: {shape: rectangle, size: [0.23, 0.41], origin: [0.62, 0], cells: [3, 5], order: 1}
       material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3, density: 10}
       supports: [{on: bottom, displacement: [0, 0]}]
 """

@@ -94,7 +94,7 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     strip:
-      mesh: {shape: rectangle, size: [2, 1], cells: [2, 1]}
+      mesh: {shape: rectangle, size: [2, 1], cells: [2, 1], order: 1}
       kinematics: linear
       material: {law: st_venant_kirchhoff, E: 1000, nu: 0.25, density: 0}
       supports:

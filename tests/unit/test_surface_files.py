@@ -171,7 +171,7 @@ structure:
   dynamics: {rho_inf: 0.8}
   bodies:
     block:
-      mesh: {shape: box, size: [1, 1, 1], cells: [2, 2, 2], translate: [2, 0, 0.01]}
+      mesh: {shape: box, size: [1, 1, 1], cells: [2, 2, 2], order: 1, translate: [2, 0, 0.01]}
       material: {law: neo_hooke, E: 100, nu: 0.3, density: 1}
       supports: [{on: top, displacement: [0, 0, "-0.02*t/0.1"]}]
 rigid:
@@ -237,7 +237,7 @@ def test_a_run_is_that_with_the_built_in_shapes():
 @pytest.mark.usefixtures("_files")
 def test_where_a_surface_is_refused():
     """An elastic body, a plane case, a surface with a hole: at the line of the mesh or its file."""
-    elastic = FILES.replace("{shape: box, size: [1, 1, 1], cells: [2, 2, 2], ", "{file: ball.stl, ")
+    elastic = FILES.replace("{shape: box, size: [1, 1, 1], cells: [2, 2, 2], order: 1, ", "{file: ball.stl, ")
     message = "case.yaml:7:13: ball.stl: the cells are a surface in space; an elastic body needs cells of its volume"
     assert message in str(refused(elastic, lambda case: read_body(case, "block")))
     plane = PLANE.replace("MESH", "{file: ball.stl}")

@@ -147,7 +147,7 @@ CONTACT = """
 time: {step: 1, end: 1}
 structure:
   bodies:
-    low: {mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}, material: {law: neo_hooke, E: 1, nu: 0.3}}
+    low: {mesh: {shape: rectangle, size: [1, 1], cells: [2, 2], order: 1}, material: {law: neo_hooke, E: 1, nu: 0.3}}
     high:
       mesh: {shape: rectangle, size: [1, 1], origin: [0, 1], cells: [3, 3], order: 2}
       material: {law: neo_hooke, E: 1, nu: 0.3}

@@ -1,0 +1,48 @@
+"""The order of the cells of elastic bodies: 2, but for some that touch."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fsci.case.flow_element import bodies_that_may_touch
+from fsci.case.mesh import FileMesh
+
+if TYPE_CHECKING:
+    from fsci.case.case import Case
+    from fsci.case.mesh import Mesh
+
+
+def is_meshed_here(mesh: Mesh) -> bool:
+    """Whether the case may say the order of the cells: no file has it."""
+    return not isinstance(mesh, FileMesh) or mesh.thickness is not None or mesh.file.endswith(".geo")
+
+
+def chooses_order(mesh: Mesh) -> bool:
+    """Whether the program chooses the order of the cells of an elastic body."""
+    return mesh.order == "auto" and is_meshed_here(mesh)
+
+
+def with_order(case: Case, name: str, *, slender: bool = False) -> Mesh:
+    """The settings of the mesh of an elastic body, with the order of its cells if the program chooses it.
+
+    For the same time second order has the smaller error, in thick bodies, too (docs/benchmarks.md). Where flows leave
+    a gap the films of `q1q1` are as coarse as cells of first order. With friction, nodes at the edge of a quadratic
+    surface may stick and slip in turn (`ironing`), which only slender bodies, wrong with first order, are worth.
+    """
+    mesh = case.elastic_bodies[name].mesh
+    if not chooses_order(mesh):
+        return mesh
+    first = name in bodies_that_may_touch(case) or (rubs(case, name) and not slender)
+    return mesh.model_copy(update={"order": 1 if first else 2})
+
+
+def rubs(case: Case, name: str) -> bool:
+    """Whether an elastic body may be in contact with friction."""
+    contact = case.contact
+    if contact is None:
+        return False
+    automatic = contact.bodies == "all" or name in (contact.bodies or ())
+    if automatic and contact.friction is not None and contact.friction.some:
+        return True
+    pairs = [pair for pair in contact.complete_pairs.values() if pair.friction is not None and pair.friction.some]
+    return any(side.body == name for pair in pairs for _, side in pair.sides)
