@@ -64,6 +64,7 @@ class RigidContact:
         self.touch = Touch(np.empty((0, 2, bodies[0].dim, 1)), self.near.body, self.near.friction)
         self.z = np.zeros_like(self.near.x)  #: forces [N] in the frames, the pressing one first
         self.stiffness = nothing((self._unknowns, self._unknowns))  #: minus the derivative of `force`, forces turning
+        self._missed = self.z  #: what contacts miss at the last press [N]
         self.tangent = self.stiffness  #: of the bodies, that the forces of the last `press` belong to
         self._start: Array | None = None  # forces in the frames at the last press of this step
         self._measured = 0  # in this step
@@ -79,12 +80,17 @@ class RigidContact:
 
     def forget(self) -> None:
         """No contact forces, until `press`."""
-        self.z = np.zeros_like(self.z)
+        self.z = self._missed = np.zeros_like(self.z)
 
     @property
     def force(self) -> Array:
         """Generalised contact force: force [N] and moment [N m] by unknown."""
         return self.touch.force(self.z, self._unknowns) if len(self.z) else np.zeros(self._unknowns)
+
+    def rounding(self) -> Array:
+        """Errors of `force`, by unknown: vertices that lie side by side need not agree on the motion of their body."""
+        sizes = Touch(np.abs(self.touch.pushed), self.touch.body, self.touch.friction)
+        return sizes.force(np.abs(self._missed), self._unknowns) if len(self.z) else np.zeros(self._unknowns)
 
     @property
     def whole_force(self) -> Array:
@@ -112,7 +118,7 @@ class RigidContact:
         self.near = search(self.pairs, self._starts, moment, kept, self._periods)
         self._measured += 1
         self.touch = self.near.touch(moment, components, free)
-        self.z = np.zeros_like(self.near.x)
+        self.z = self._missed = np.zeros_like(self.near.x)
         known, forces = self._pressing
         at, of = same_rows(self.near.names(), known)
         if len(at):
@@ -144,12 +150,12 @@ class RigidContact:
         if not upright and (self._start is None or not braced(tangent, self.touch, self._start)):
             self.tangent, upright = tangent + -1.0 * self.stiffness, True
         try:
-            self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
+            _, self.z, self._missed = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)
         except StepFailed:
             if upright:
                 raise
             self.tangent = tangent + -1.0 * self.stiffness
-            self.z = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)[1]
+            _, self.z, self._missed = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)
         active = self.active
         in_space = np.einsum("mde,md->me", self.near.frame[active], self.z[active])
         self._pressing = self.near.names()[active], in_space

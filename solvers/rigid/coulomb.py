@@ -233,8 +233,12 @@ def braced(K: Sparse, touch: Touch, z: Array) -> bool:
     return positive_definite(K + B.T @ B)
 
 
-def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | None = None) -> tuple[Array, Array]:
-    """(u, z) of shapes (n,) and (m, dim). start: z of a problem nearby.
+def contact_forces(
+    K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """(u, z, missed) of shapes (n,), (m, dim) and (m, dim). start: z of a problem nearby.
+
+    missed: ways that contacts miss, times their stiffness r [N].
 
     Raises StepFailed if there is no motion with w_n >= 0: bodies that are held, or between others, have no room.
     """
@@ -242,7 +246,7 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
     m = len(w0)
     near = (w0 + touch.motion(free))[:, 0] < 0.0 if start is None else np.ones(m, dtype=bool)
     if not near.any():
-        return free, np.zeros_like(w0)
+        return free, np.zeros_like(w0), np.zeros_like(w0)
     r = _stiffness(K, touch)
     if (w0[~(r > 0.0), 0] < 0.0).any():
         raise StepFailed("rigid bodies", FailureKind.NO_ROOM, NO_MOTION)
@@ -262,7 +266,7 @@ def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | 
         way = float((r * np.linalg.norm(system.motion(u) - system.motion(free), axis=1)).max())
         vanish = float(np.abs(z).max()) <= FORCE_ROUNDING * float(sizes.max())
         if (vanish and (np.abs(change) <= FOUND * sizes).all()) or _found(z, change, last, share, way):
-            return u, z
+            return u, z, change
         slow = float(np.abs(change).max()) > SLOW_CHANGE * float(np.abs(last).max())
         share = min(LARGEST_SHARE if slow else max(1.0, share), SHARE_GROWTH * share)
     if (change[:, 0] > FORCE_ROUNDING * np.abs(z).max()).any():

@@ -426,9 +426,10 @@ class RigidBodies:
         """Whether the balance of each body is rounding errors, where this step linearised last (collective)."""
         if self._noise is None:
             self.linearise()
-        assert self._noise is not None
-        missed = self.balance if self.contact is None else self.balance - self.contact.force
-        return (np.abs(missed) <= self._from_owner(self._noise)).reshape(len(self.bodies), -1).all(axis=1)
+        missed, noise = self.balance, self._from_owner(self._noise)  # type: ignore[arg-type]
+        if self.contact is not None:
+            missed, noise = missed - self.contact.force, noise + self.contact.rounding()
+        return (np.abs(missed) <= noise).reshape(len(self.bodies), -1).all(axis=1)
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the centre of the body with the largest residual."""

@@ -46,7 +46,9 @@ class Closed:
         rebound = -restitution * np.minimum(self.relative(before)[:, 0], 0.0)
         offset = self.given.copy()
         offset[:, 0] -= rebound
-        velocity, impulse = contact_forces(self.mass, self.mass @ without, self.touch, offset, self.moment.dt * self.z)
+        velocity, impulse, _ = contact_forces(
+            self.mass, self.mass @ without, self.touch, offset, self.moment.dt * self.z
+        )
         self._require_forces(before, self.moment.dt)
         staying = (rebound == 0.0) & (impulse[:, 0] > 0.0)
         ways = np.where(self._slide(impulse)[:, None], impulse[:, 1:] / np.maximum(impulse[:, :1], 1e-300), 0.0)

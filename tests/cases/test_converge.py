@@ -43,7 +43,7 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     ring:
-      mesh: {shape: ring, inner_radius: 1, outer_radius: 2, angle: 90, cells: [12, 8]}   # first order
+      mesh: {shape: ring, inner_radius: 1, outer_radius: 2, angle: 90, cells: [12, 8], order: 1}   # first order
       material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3}
       kinematics: linear
       supports: [{on: [start, end], symmetry: true}]

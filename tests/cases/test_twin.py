@@ -31,11 +31,11 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     low:
-      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}
+      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2], order: 1}
       material: {law: neo_hooke, E: 100, nu: 0}
       supports: [{on: bottom, displacement: [0, 0]}]
     high:
-      mesh: {shape: rectangle, size: [1, 1], origin: [0, 1], cells: [3, 3]}
+      mesh: {shape: rectangle, size: [1, 1], origin: [0, 1], cells: [3, 3], order: 1}
       material: {law: neo_hooke, E: 100, nu: 0}
       supports: [{on: top, displacement: [0, -0.1]}]
 contact:

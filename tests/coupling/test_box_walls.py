@@ -27,7 +27,7 @@ structure:
   dynamics: {rho_inf: 0, damping: {mass: 20}}
   bodies:
     block:
-      mesh: {shape: rectangle, size: [0.4, 0.2], cells: [4, 3], origin: [0.333, 0.05]}
+      mesh: {shape: rectangle, size: [0.4, 0.2], cells: [4, 3], order: 1, origin: [0.333, 0.05]}
       material: {law: neo_hooke, E: 3e4, nu: 0.3, density: 20}
       gravity: [0, -10]
 coupling: {}
@@ -42,7 +42,7 @@ SPACE = {
     "top: {on: y+": "top: {on: z+",
     "[x-, x+], slip": "[x-, x+, y-, y+], slip",
     "floor: {on: y-": "floor: {on: z-",
-    "shape: rectangle, size: [0.4, 0.2], cells: [4, 3], origin: [0.333, 0.05]": (
+    "shape: rectangle, size: [0.4, 0.2], cells: [4, 3], order: 1, origin: [0.333, 0.05]": (
         "shape: box, size: [0.4, 0.4, 0.2], cells: [2, 2, 2], origin: [0.333, 0.2, 0.05]"
     ),
     "gravity: [0, -10]": "gravity: [0, 0, -10]",
@@ -165,7 +165,7 @@ def test_a_disc_bounces_in_both_schemes_alike(tmp_path):
     """A disc reaches the floor at 1.5 m/s; `contact: none` lets it through."""
     disc = changed(
         BLOCK,
-        ("shape: rectangle, size: [0.4, 0.2], cells: [4, 3], origin: [0.333, 0.05]", DISC),
+        ("shape: rectangle, size: [0.4, 0.2], cells: [4, 3], order: 1, origin: [0.333, 0.05]", DISC),
         (", damping: {mass: 20}", ""),
         ("viscosity: 0.1", "viscosity: 0.02"),
         ("gravity: [0, -10]", "initial_velocity: [0, -1.5]"),
@@ -181,7 +181,7 @@ def test_a_disc_bounces_in_both_schemes_alike(tmp_path):
     assert through["centre.y"][-1] < 0.12
 
 
-DISC = "shape: disc, radius: 0.15, cells: [16, 2], translate: [0.533, 0.25]"
+DISC = "shape: disc, radius: 0.15, cells: [16, 2], order: 1, translate: [0.533, 0.25]"
 
 
 def test_a_resumed_run_is_the_same(tmp_path):

@@ -37,7 +37,7 @@ structure:
   dynamics: {}
   bodies:
     disc:
-      mesh: {shape: rectangle, size: [0.2, 0.4], cells: [3, 6], translate: [X, 0]}
+      mesh: {shape: rectangle, size: [0.2, 0.4], cells: [3, 6], order: 1, translate: [X, 0]}
       material: {law: neo_hooke, E: 50, nu: 0.4, density: 1.5}
       supports: [{on: bottom, displacement: [0, 0]}]
 """

@@ -15,7 +15,7 @@ time: {step: 0.05, end: 0.1}
 structure:
   bodies:
     block:
-      mesh: {shape: rectangle, size: [0.3, 0.35], cells: [3, 4], origin: [0.8, 0]}
+      mesh: {shape: rectangle, size: [0.3, 0.35], cells: [3, 4], order: 1, origin: [0.8, 0]}
       material: {law: neo_hooke, E: 50, nu: 0.3, density: 2}
       supports: [{on: bottom, displacement: [0, 0]}]
   dynamics: {rho_inf: 0.8}

@@ -32,6 +32,7 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         covered=covered,
         stiffness=one,
         stuck=np.zeros(size, dtype=bool),
+        free=np.zeros(size, dtype=bool),
         c_n=c,
         c_t=one,
         touching=0.0 * one,

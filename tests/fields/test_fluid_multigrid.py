@@ -141,7 +141,7 @@ def test_steady_flow_with_convection_takes_few_iterations(cells, monkeypatch):
 
     def counted(ksp, *arguments, **more):
         try:
-            solve(ksp, *arguments, **more)
+            return solve(ksp, *arguments, **more)
         finally:
             counts.append(ksp.getIterationNumber())
 

@@ -89,7 +89,7 @@ RELAXING = (Branch(0.4, 0.05),)
     ("cell_type", "element", "relaxing"),
     [
         ("quad9", "mixed", RELAXING),
-        ("hexahedron", "displacement", RELAXING),
+        pytest.param("hexahedron", "displacement", RELAXING, marks=pytest.mark.slow),
         pytest.param("quad9", "displacement", (), marks=pytest.mark.slow),
         pytest.param("quad9", "displacement", RELAXING, marks=pytest.mark.slow),
         pytest.param("quad9", "mixed", (), marks=pytest.mark.slow),

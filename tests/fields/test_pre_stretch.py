@@ -61,7 +61,9 @@ def stretched_bar(
 
 
 @pytest.mark.parametrize("material", [NEO_HOOKE, OGDEN])
-@pytest.mark.parametrize(("element", "angle"), [("displacement", 0.0), ("mixed", 33.0)])
+@pytest.mark.parametrize(
+    ("element", "angle"), [("displacement", 0.0), pytest.param("mixed", 33.0, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("stretch", [1.2, 0.8])
 def test_free_bar_returns_to_its_free_length(tmp_path, material, element, angle, stretch):
     found = stretched_bar(tmp_path, material=material, stretch=stretch, angle=angle, more=f"element: {element}")

@@ -55,7 +55,7 @@ def sheared(size):
     return lambda t: np.eye(3) + size(t) * np.eye(3)[:, [0]] * np.eye(3)[[2]]
 
 
-@pytest.mark.parametrize("element", ["displacement", "mixed"])
+@pytest.mark.parametrize("element", ["displacement", pytest.param("mixed", marks=pytest.mark.slow)])
 def test_relaxation(element):
     """After a jump, here within one step about t = h/2: the stress after a long time times 1 + sum b exp(-t/tau)."""
     h = 0.002

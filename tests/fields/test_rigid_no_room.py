@@ -24,7 +24,7 @@ def squeezed(missing):
 @pytest.mark.parametrize("missing", [0.0, 1e-14, 1e-10, 1e-9, 1e-8])
 def test_a_pile_that_misses_its_room_by_rounding(missing):
     """Walls that are nearer than the width by 1e-8 of the way by the forces (1): friction holds the body."""
-    u, z = squeezed(missing)
+    u, z, _ = squeezed(missing)
     assert STIFFNESS @ u - WEIGHT == pytest.approx(SIDES.force(z, 3), abs=1e-12)
     assert np.abs(SIDES.motion(u)[:, 0] - missing).max() <= 2.0 * missing + 1e-15
     assert (np.abs(z[:, 1]) <= 0.3 * z[:, 0] * (1.0 + 1e-12)).all()
@@ -53,6 +53,6 @@ def falling_beside_a_wall(angle):
 def test_contacts_that_carry_nothing():
     """Bodies that touch and fall side by side: no forces, whatever these were before."""
     for angle in 0.3 + 0.011 * np.arange(121):
-        u, z = falling_beside_a_wall(angle)
+        u, z, _ = falling_beside_a_wall(angle)
         assert np.abs(z).max() <= 1e-8
         assert u == pytest.approx([0, -10, 0, 0, -10, 0], abs=1e-8)

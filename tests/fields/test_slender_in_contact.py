@@ -96,7 +96,7 @@ def test_a_stop_bears_what_beam_theory_says(name, tmp_path):
     assert borne(tmp_path, SCENES[name]) == pytest.approx(BORNE, rel=0.015)
     assert degree_of_cells(load_case(tmp_path), "beam") == 2
     if "block" in SCENES[name]:
-        assert degree_of_cells(load_case(tmp_path), "block") == 1
+        assert degree_of_cells(load_case(tmp_path), "block") == 2
 
 
 def test_in_millimetres(tmp_path):

@@ -58,11 +58,11 @@ units: {{length: m, mass: kg, time: s}}
 structure:
   bodies:
     a:
-      mesh: {{shape: rectangle, size: [{one}, {one}], cells: [2, 2], origin: [{far}, 0]}}
+      mesh: {{shape: rectangle, size: [{one}, {one}], order: 1, cells: [2, 2], origin: [{far}, 0]}}
       material: {{law: st_venant_kirchhoff, E: 1e6, nu: 0}}
       supports: [{{on: bottom, displacement: [0, 0]}}]
     b:
-      mesh: {{shape: rectangle, size: [{wide}, {half}], cells: [3, 2], origin: [{far}, {height!r}]}}
+      mesh: {{shape: rectangle, size: [{wide}, {half}], order: 1, cells: [3, 2], origin: [{far}, {height!r}]}}
       material: {{law: st_venant_kirchhoff, E: 1e6, nu: 0}}
       supports: [{{on: left, symmetry: true}}]
       tractions: [{{on: top, value: [0, "-1e3*t"]}}]

@@ -35,7 +35,7 @@ def test_sums_over_points_and_vertices(dim):
     [
         (0, np.zeros((5, 6, 3)), "moments has another shape"),
         (2, np.array([0, 1, 2, 0, 3]), "a piece is in no cell of the density"),
-        (3, np.zeros((5, 4)), "normals have two or three components"),
+        (3, np.zeros((5, 4)), "no element has such rows"),
         (6, np.zeros(4), "leak has another shape"),
     ],
 )

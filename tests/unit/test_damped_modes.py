@@ -17,7 +17,7 @@ structure:
   bodies:
     bar:
       kinematics: linear
-      mesh: {shape: rectangle, size: [1, 2], cells: [1, 2]}
+      mesh: {shape: rectangle, size: [1, 2], order: 1, cells: [1, 2]}
       material: {law: neo_hooke, E: 1, nu: 0, density: 1}
       supports:
         - {on: bottom, displacement: [0, 0]}

@@ -23,7 +23,7 @@ PARTS = {
     "times.yaml": "time: {step: 0.2, end: 1}\n",
     "structure.yaml": "bodies:   # bodies\n  plate:\n    include: plate.yaml\n    body_force: [0, '1e-6*t']\n",
     "plate.yaml": """\
-mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}   # four cells
+mesh: {shape: rectangle, size: [1, 1], cells: [2, 2], order: 1}   # four cells
 material: {law: neo_hooke, E: 1, nu: 0.3}
 supports: {include: supports.yaml}
 body_force: [1, 1]
@@ -78,7 +78,7 @@ def test_run_and_resume():
             "  material: {law: neo_hooke, E: 1, nu: 0.7}",
         ),
         ("parts/supports.yaml", "on: left", "on: lefd", "parts/supports.yaml:1:8: 'rectangle' has no surface 'lefd'"),
-        ("parts/plate.yaml", "cells: [2, 2]", "cells: [2, 2", "parts/plate.yaml:1:47: this list needs ',' or ']'"),
+        ("parts/plate.yaml", "[2, 2], order: 1", "[2, 2", "parts/plate.yaml:1:47: this list needs ',' or ']'"),
         ("parts/times.yaml", "step: 0.2, ", "", "parts/times.yaml:1:1: missing setting 'step' in 'time'"),
         ("case.yaml", "times.yaml", "time.yaml",
          "case.yaml:1:10: the included file 'parts/time.yaml' cannot be read: No such file or directory\n"
@@ -129,6 +129,6 @@ def test_schema_takes_a_file_for_a_section_or_a_list_of_sections():
 
 def test_folder_of_the_case_is_where_names_count_from():
     """Also those in a file in another folder."""
-    mesh = "shape: rectangle, size: [1, 1], cells: [2, 2]"
+    mesh = "shape: rectangle, size: [1, 1], cells: [2, 2], order: 1"
     Path("parts", "plate.yaml").write_text(PARTS["plate.yaml"].replace(mesh, "file: a.msh"))
     assert f"parts/plate.yaml:1:14: mesh file 'a.msh' not found in {Path().absolute()}\n" in str(refused(MAIN))
