@@ -154,7 +154,7 @@ structure:
       material: {law: neo_hooke, E: 1.0e+6, nu: 0.3}
       supports: [{on: bottom, displacement: [0, 0]}]
     ice:
-      mesh: {shape: rectangle, size: [0.8, 0.3], cells: [4, 1], origin: [-0.3, -0.3]}
+      mesh: {shape: rectangle, size: [0.8, 0.3], cells: [4, 1], order: 1, origin: [-0.3, -0.3]}
       material: {law: neo_hooke, E: 1.0e+6, nu: 0.3}
       supports: [{on: bottom, displacement: [0, 0]}]
 contact:
