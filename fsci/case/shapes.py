@@ -78,8 +78,8 @@ class ShapeSection(PlacedMesh):
     takes: ClassVar[Mapping[str, Takes]]
     order: Order = setting(
         "auto",
-        "polynomial order of the cells; auto: 2 for an elastic body, but 1 where it may touch something in a flow, or "
-        "slides with friction and is not slender",
+        "polynomial order of the cells; auto: 2 for an elastic body, but 1 where it may touch in a flow or, if it is "
+        "not slender, with friction or in space",
     )
     if TYPE_CHECKING:
         shape: str

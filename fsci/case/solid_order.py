@@ -27,22 +27,25 @@ def with_order(case: Case, name: str, *, slender: bool = False) -> Mesh:
 
     For the same time second order has the smaller error, in thick bodies, too (docs/benchmarks.md). Where flows leave
     a gap the films of `q1q1` are as coarse as cells of first order. With friction, nodes at the edge of a quadratic
-    surface may stick and slip in turn (`ironing`), which only slender bodies, wrong with first order, are worth.
+    surface may stick and slip in turn (`ironing`), and in space a ball that presses a part of one facet may find no
+    equilibrium: only slender bodies, wrong with first order, are worth it.
     """
     mesh = case.elastic_bodies[name].mesh
     if not chooses_order(mesh):
         return mesh
-    first = name in bodies_that_may_touch(case) or (rubs(case, name) and not slender)
+    fragile = touches(case, name, with_friction=case.dimension == 2)
+    first = name in bodies_that_may_touch(case) or (fragile and not slender)
     return mesh.model_copy(update={"order": 1 if first else 2})
 
 
-def rubs(case: Case, name: str) -> bool:
-    """Whether an elastic body may be in contact with friction."""
+def touches(case: Case, name: str, *, with_friction: bool) -> bool:
+    """Whether an elastic body may be in contact, or in contact with friction."""
     contact = case.contact
     if contact is None:
         return False
     automatic = contact.bodies == "all" or name in (contact.bodies or ())
-    if automatic and contact.friction is not None and contact.friction.some:
+    if automatic and (not with_friction or (contact.friction is not None and contact.friction.some)):
         return True
-    pairs = [pair for pair in contact.complete_pairs.values() if pair.friction is not None and pair.friction.some]
-    return any(side.body == name for pair in pairs for _, side in pair.sides)
+    pairs = contact.complete_pairs.values()
+    counted = [pair for pair in pairs if not with_friction or (pair.friction is not None and pair.friction.some)]
+    return any(side.body == name for pair in counted for _, side in pair.sides)

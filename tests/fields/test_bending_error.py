@@ -223,6 +223,27 @@ def test_order_with_friction(tmp_path, friction, where, degree):
     assert read_body(both, "beam").cell_type == "quad9"
 
 
+PRESSED = """
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    thick: {mesh: {shape: box, size: [1, 1, 0.5], cells: [2, 2, 1]}, material: {law: neo_hooke, E: 1, nu: 0.3}}
+    thin:
+      mesh: {shape: box, size: [1, 1, 0.1], cells: [2, 2, 1], origin: [0, 0, 0.5]}
+      material: {law: neo_hooke, E: 1, nu: 0.3}
+"""
+
+
+def test_order_of_bodies_in_contact_in_space(tmp_path):
+    """A thick one has first order there: a ball that presses a part of a quadratic facet may find no equilibrium."""
+    found = []
+    for contact in ("", "contact: {bodies: all}\n"):
+        (tmp_path / "case.yaml").write_text(PRESSED + contact)
+        case = load_case(tmp_path / "case.yaml")
+        found.append([CELL_TYPES[read_body(case, name).cell_type].degree for name in ("thick", "thin")])
+    assert found == [[2, 2], [1, 2]]
+
+
 FLOW = """{density: 1, viscosity: 1, scheme: bdf2, grid: {from: [0, -1], to: [3, 1], cells: [12, 8]},
  patches: {walls: {on: [x-, y-, y+], no_slip: true}, out: {on: x+, outflow: true}}}"""
 
