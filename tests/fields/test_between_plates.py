@@ -19,7 +19,7 @@ structure:
       material: {law: neo_hooke, E: 2.0e+5, nu: 0.3, density: 300}
       supports: [{on: bottom, displacement: [0, 0, 0]}]
     upper:
-      mesh: {shape: box, size: [0.6, 0.6, 0.1], cells: [5, 5, 1], origin: [0.1, 0.1, 0.4991]}
+      mesh: {shape: box, size: [0.6, 0.6, 0.1], cells: [5, 5, 1], order: 1, origin: [0.1, 0.1, 0.4991]}
       material: {law: neo_hooke, E: 2.0e+5, nu: 0.3, density: 300}
       gravity: [0, 0, -10]
       supports: [{on: [left, right], displacement: [0, null, null]}, {on: [front, back], displacement: [null, 0, null]}]
@@ -41,7 +41,7 @@ DISC = (
         "shape: box, size: [0.8, 0.8, 0.2], cells: [6, 6, 2]", "shape: rectangle, size: [0.8, 0.2], cells: [12, 3]"
     )
     .replace(
-        "box, size: [0.6, 0.6, 0.1], cells: [5, 5, 1], origin: [0.1, 0.1,",
+        "box, size: [0.6, 0.6, 0.1], cells: [5, 5, 1], order: 1, origin: [0.1, 0.1,",
         "rectangle, size: [0.6, 0.1], cells: [9, 2], origin: [0.1,",
     )
     .replace("displacement: [0, 0, 0]", "displacement: [0, 0]")
