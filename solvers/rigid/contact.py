@@ -23,7 +23,7 @@ from solvers.algebra.rows import RowTransformation
 from solvers.algebra.sparse import Sparse, nothing, sparse_from_entries
 from solvers.api import Array, StepFailed
 from solvers.rigid.body import RigidBody
-from solvers.rigid.coulomb import Touch, braced, contact_forces, positive_definite
+from solvers.rigid.coulomb import FORCE_ROUNDING, Touch, braced, contact_forces, positive_definite
 from solvers.rigid.impact import AT_BOUND, Closed
 from solvers.rigid.near import Moment, Near, Obstacle, RigidPair, same_rows, search, vertices
 from solvers.rigid.turning import turning
@@ -88,9 +88,14 @@ class RigidContact:
         return self.touch.force(self.z, self._unknowns) if len(self.z) else np.zeros(self._unknowns)
 
     def rounding(self) -> Array:
-        """Errors of `force`, by unknown: vertices that lie side by side need not agree on the motion of their body."""
+        """Errors of `force`, by unknown: vertices that lie side by side need not agree on the motion of their body.
+
+        No more than `FORCE_ROUNDING` of the forces: a body that misses more is not in balance.
+        """
+        if len(self.z) == 0:
+            return np.zeros(self._unknowns)
         sizes = Touch(np.abs(self.touch.pushed), self.touch.body, self.touch.friction)
-        return sizes.force(np.abs(self._missed), self._unknowns) if len(self.z) else np.zeros(self._unknowns)
+        return sizes.force(np.minimum(np.abs(self._missed), FORCE_ROUNDING * np.abs(self.z).max()), self._unknowns)
 
     @property
     def whole_force(self) -> Array:
