@@ -14,7 +14,7 @@ Source: Moreau in Moreau, Panagiotopoulos, Nonsmooth Mechanics and Applications 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,29 +141,30 @@ class RigidContact:
         ways[:, 0] = self.near.gap - np.where(moves, self.standoff, 0.0)
         return ways
 
-    def press(self, tangent: Sparse, right: Array) -> None:
+    def press(self, tangent: Sparse, upright: Callable[[], Sparse], right: Array) -> None:
         """Set the contact forces for a Newton iteration; right: minus the balance without contact.
 
         When the balance with these forces vanishes, gaps and forces fulfil the conditions of contact. Where forces that
-        turn are larger than what the inertia of the bodies and the contacts of the last iterate hold upright, they do
-        not turn in `tangent`.
+        turn are larger than what the inertia of the bodies and the contacts of the last iterate hold upright, the
+        tangent is `upright`: that in which forces of contact and of a flow do not turn.
         """
         self.tangent = tangent
         if len(self.z) == 0:
             return
-        upright = positive_definite(tangent)
-        if not upright and (self._start is None or not braced(tangent, self.touch, self._start)):
-            self.tangent, upright = tangent + -1.0 * self.stiffness, True
+        turning = positive_definite(tangent) or (self._start is not None and braced(tangent, self.touch, self._start))
         try:
-            _, self.z, self._missed = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)
+            self._press(tangent if turning else upright(), right)
         except StepFailed:
-            if upright:
+            if not turning:
                 raise
-            self.tangent = tangent + -1.0 * self.stiffness
-            _, self.z, self._missed = contact_forces(self.tangent, right, self.touch, self._ways(), self._start)
+            self._press(upright(), right)
         active = self.active
         in_space = np.einsum("mde,md->me", self.near.frame[active], self.z[active])
         self._pressing = self.near.names()[active], in_space
+
+    def _press(self, tangent: Sparse, right: Array) -> None:
+        self.tangent = tangent
+        _, self.z, self._missed = contact_forces(tangent, right, self.touch, self._ways(), self._start)
 
     def transformation(self) -> RowTransformation | None:
         """Transformation that eliminates the forces from J du = b + F z with C du = -c; None without contact.

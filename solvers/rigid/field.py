@@ -64,15 +64,12 @@ class RigidBodies:
         self.surfaces = {body.name: body.points for body in bodies}
         self.now = [RigidInstant.at_rest() for _ in bodies]
         self.old = list(self.now)
-        self.on_surface = np.zeros((len(bodies), 6))  #: force and moment by the flow [N, N m], at present
-        self.on_surface_old = np.zeros((len(bodies), 6))
+        self.on_surface = self.on_surface_old = np.zeros((len(bodies), 6))  #: force and moment by the flow [N, N m]
         self._forces = [np.zeros((len(body.points), self.dim)) for body in bodies]  #: on the vertices [N]
         self._pressing: list[tuple[int, Array, Array]] = []  #: see `press`
         self._pressed_weight = 1.0
-        self.pressed = np.zeros(self.unknowns)  #: by contact with others, at present [N, N m]
-        self.pressed_old = np.zeros(self.unknowns)
-        self._u, self._last = np.zeros((len(bodies), 6)), np.zeros((len(bodies), 6))
-        self._held_u = np.zeros((len(bodies), 6))  #: increments of the held components in this step
+        self.pressed = self.pressed_old = np.zeros(self.unknowns)  #: by contact with others, at present [N, N m]
+        self._u, self._last, self._held_u = np.zeros((3, len(bodies), 6))  #: increments: whole, last one, of held ones
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         free = np.ones((len(bodies), 6), dtype=bool)
         for index, body in enumerate(bodies):
@@ -138,7 +135,7 @@ class RigidBodies:
         self.extrapolate()
         if self.contact is not None:
             with self.timer("contact"):
-                leave_others(self.contact, self._by_component(self._u), self._measure, self._system, self._add)
+                leave_others(self.contact, self._by_component(self._u), self._measure, self._upright(), self._add)
             self._last = self._u - self._held_u
 
     def increments(self) -> Array:
@@ -290,7 +287,7 @@ class RigidBodies:
             return self._norms(self.balance)
         with self.timer("contact"), supported():
             self._measure()
-            self.contact.press(self._system(), -self.balance)
+            self.contact.press(self._system(), self._upright, -self.balance)
         return self._norms(self.balance - self.contact.force)
 
     def _measure(self) -> None:
@@ -318,33 +315,34 @@ class RigidBodies:
         return np.max([self._norms(rows) for rows in all_forces], axis=0)
 
     def tangent(self) -> Sparse:
-        """d(balance)/d(unknowns), including the change of moments of forces on the vertices by rotation.
+        """d(balance)/d(unknowns); forces on the vertices turn with them, and contact forces as at the last residual."""
+        return self._turning(self._blocks(), np.ones(self.unknowns, dtype=bool))
 
-        Contact forces turn, too, as they were at the last evaluation of the residual.
-        """
-        return self._with_others(block_diagonal(self._blocks()), np.ones(self.unknowns, dtype=bool))
-
-    def _with_others(self, own: Sparse, free: NDArray[np.bool_]) -> Sparse:
-        """The tangent of single bodies, and what springs and contact between them add; free: mask of the unknowns."""
-        if self.springs:
-            parts = zip(self.old, self.now, self._u, strict=True)
-            rates = [motion.velocity_rate(self.scheme, old, now, u[3:], self.current.dt) for old, now, u in parts]
-            loads = line_springs.tangent(self.springs, self.bodies, self.now, rates, self.components, free)
-            own = own + -self.force_weight * loads
+    def _turning(self, blocks: Array, free: NDArray[np.bool_]) -> Sparse:
+        """The tangent of all bodies, where contact forces turn; free: mask of the unknowns."""
+        own = self._with_springs(blocks, free)
         return own if self.contact is None else own + self.contact.stiffness
+
+    def _with_springs(self, blocks: Array, free: NDArray[np.bool_]) -> Sparse:
+        """The same without contact."""
+        if not self.springs:
+            return block_diagonal(blocks)
+        rates = motion.velocity_rates(self.scheme, self.old, self.now, self._u[:, 3:], self.current.dt)
+        loads = line_springs.tangent(self.springs, self.bodies, self.now, rates, self.components, free)
+        return block_diagonal(blocks) + -self.force_weight * loads
 
     def _blocks(self) -> Array:
         """The tangent of each body alone, shape (bodies, unknowns of a body, unknowns of a body)."""
-        found, weight, t, dt = [], self.force_weight, self.current.t, self.current.dt
-        parts = zip(self.bodies, self.old, self.now, self._u, self._forces, strict=True)
-        for index, (body, old, now, u, force) in enumerate(parts):
-            own = motion.own_tangent(body, self.scheme, old, now, u[3:], t, dt)
-            own[3:, 3:] -= weight * surface.turned(body, now, body.points, force)
-            for at, points, pressing in self._pressing:
-                if at == index:
-                    own[3:, 3:] -= self._pressed_weight * surface.turned(body, now, points, pressing)
-            found.append(own[np.ix_(self.components, self.components)])
-        return np.array(found)
+        turned = surface.turned_blocks(self.bodies, self.now, self._forces, self.components)
+        return self._upright_blocks() - self.force_weight * turned
+
+    def _upright_blocks(self) -> Array:
+        """The same where forces of the flow do not turn."""
+        found = motion.own_tangents(self.bodies, self.scheme, self.old, self.now, self._u[:, 3:], self.current)
+        for index, points, force in self._pressing:
+            body, now = self.bodies[index], self.now[index]
+            found[index, 3:, 3:] -= self._pressed_weight * surface.turned(body, now, points, force)
+        return found[:, self.components[:, None], self.components]
 
     def linearise(self) -> PETSc.Mat:
         """The tangent as a distributed matrix."""
@@ -365,7 +363,11 @@ class RigidBodies:
 
     def _system(self) -> Sparse:
         """The tangent with rows and columns of the identity for held components."""
-        return self._with_others(block_diagonal(self._without_held(self._blocks())), self._free)
+        return self._turning(self._without_held(self._blocks()), self._free)
+
+    def _upright(self) -> Sparse:
+        """The same where forces of the flow and of contact do not turn."""
+        return self._with_springs(self._without_held(self._upright_blocks()), self._free)
 
     def _without_held(self, blocks: Array) -> Array:
         """Blocks of bodies with rows and columns of the identity for held components."""
@@ -493,8 +495,6 @@ class RigidBodies:
         return {"bodies": parts, **loads, "exchanged": self._exchanged}
 
     def restore(self, state: State) -> None:
-        self.now = [
-            RigidInstant(**{k: a.copy() for k, a in state["bodies"][body.name].items()}) for body in self.bodies
-        ]
-        self.on_surface, self._exchanged = state["on_surface"].copy(), state["exchanged"]
-        self.pressed = state["pressed"].copy()
+        parts, self._exchanged = state["bodies"], state["exchanged"]
+        self.now = [RigidInstant(**{k: a.copy() for k, a in parts[body.name].items()}) for body in self.bodies]
+        self.on_surface, self.pressed = state["on_surface"].copy(), state["pressed"].copy()

@@ -23,7 +23,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, FailureKind, StepFailed, StepInfo
+from solvers.api import Array, FailureKind, Step, StepFailed, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.rigid.body import RigidBody
 from solvers.rigid.rotation import rotation, skew, vector_rate
@@ -146,6 +146,13 @@ def velocity_rate(scheme: GeneralisedAlpha, old: RigidInstant, now: RigidInstant
     return np.block([[rate * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), by_w]])
 
 
+def velocity_rates(
+    scheme: GeneralisedAlpha, old: Sequence[RigidInstant], now: Sequence[RigidInstant], theta: Array, dt: float
+) -> list[Array]:
+    """`velocity_rate` of each body; theta: rotation vectors in the step, shape (bodies, 3)."""
+    return [velocity_rate(scheme, then, end, turn, dt) for then, end, turn in zip(old, now, theta, strict=True)]
+
+
 def with_motion(now: RigidInstant, components: NDArray[np.int64], velocity: Array, rate: Array) -> RigidInstant:
     """The instant with another velocity [m/s, rad/s] in space, and rate of momentum [N, N m], in these components."""
     v, p = np.zeros(6), now.p.copy()
@@ -161,6 +168,19 @@ def own_tangent(
     rate = velocity_rate(scheme, old, now, theta, dt)
     loads = body.own_load_tangent(t, now.shift, now.R, now.v[:3], spin(now), rate)
     return inertia_tangent(body, scheme, old, now, theta, dt) - (1.0 - scheme.alpha_f) * loads
+
+
+def own_tangents(
+    bodies: Sequence[RigidBody],
+    scheme: GeneralisedAlpha,
+    old: Sequence[RigidInstant],
+    now: Sequence[RigidInstant],
+    theta: Array,
+    step: Step,
+) -> Array:
+    """`own_tangent` of each body, shape (bodies, 6, 6); theta: rotation vectors in the step, shape (bodies, 3)."""
+    parts = zip(bodies, old, now, theta, strict=True)
+    return np.array([own_tangent(body, scheme, then, end, turn, step.t, step.dt) for body, then, end, turn in parts])
 
 
 def inertia_tangent(

@@ -28,22 +28,21 @@ def leave_others(
     contact: RigidContact,
     way: Array,
     measure: Callable[[], None],
-    system: Callable[[], Sparse],
+    upright: Sparse,
     move: Callable[[Array], object],
 ) -> None:
     """Move bodies out of what they enter; where they have no room, as far as found.
 
-    way: predicted increments by unknown; measure: sets the gaps of the iterate; system: its tangent; move: adds an
-    increment to it.
+    way: predicted increments by unknown; measure: sets the gaps of the iterate; upright: its tangent, in which forces
+    do not turn; move: adds an increment to it.
     """
-    A, moved = None, np.zeros_like(way)
+    moved = np.zeros_like(way)
     for _ in range(PREDICTIONS):
         measure()
-        A = system() if A is None else A
-        back = -(A @ moved)
+        back = -(upright @ moved)
         try:
             with supported():
-                contact.press(A + contact.stiffness, back)
+                contact.press(upright + contact.stiffness, lambda: upright, back)
                 increment = solver(contact.tangent)(back + contact.force)
         except StepFailed:
             break

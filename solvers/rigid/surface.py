@@ -66,3 +66,19 @@ def turned(body: RigidBody, now: RigidInstant, points: Array, force: Array) -> A
     """Derivative of the moment of forces on points by a rotation, sum of r f^T - (f . r) 1, shape (3, 3)."""
     found = body.arms(now.R, points).T @ in_space(force)
     return np.asarray(found - np.trace(found) * np.eye(3))
+
+
+def turned_blocks(
+    bodies: Sequence[RigidBody],
+    instants: Sequence[RigidInstant],
+    forces: Sequence[Array],
+    components: NDArray[np.int64],
+) -> Array:
+    """`turned` of each body, in the places of its unknowns, shape (bodies, unknowns of a body, unknowns of a body).
+
+    forces: on the vertices by body; components: the unknowns of a body among its six.
+    """
+    found = np.zeros((len(bodies), 6, 6))
+    for block, body, now, force in zip(found, bodies, instants, forces, strict=True):
+        block[3:, 3:] = turned(body, now, body.points, force)
+    return found[:, components[:, None], components]
