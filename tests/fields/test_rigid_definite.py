@@ -1,6 +1,9 @@
 """Whether the tangent of rigid bodies is positive definite, by its pivots, and piles that need to know."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from solvers.algebra.sparse import sparse_from_entries
 from solvers.march import march
@@ -77,3 +80,26 @@ def test_eight_discs_settle_in_a_shaft():
     taken = [info.iterations for _, info in march(field, 0.3, 30)]
     assert max(taken) <= 12
     assert field.contact.active.sum() >= 4
+
+
+def pressed_disc(squeeze):
+    """A disc with friction on a floor, pressed from all sides by a flow; field after a residual, like an iterate."""
+    body = replace(disc(0, np.array([0.0, 0.0449])), gravity=(1.0, -10.0, 0.0))
+    floor = RigidWall("floor", np.array([0.0, 0.0]), np.array([0.0, 1.0]))
+    field = RigidBodies([body], contact=RigidContact([body], [RigidPair(0, floor, 0.3)]))
+    field.initialise(0.0, 0.01)
+    field.begin_step(0.0, 0.01)
+    field.set_increments(np.array([[0.0, -1e-3, 0.0, 0.0, 0.0, 0.0]]))
+    arms = body.points - np.array([0.0, 0.0449])
+    field.load(-squeeze * arms / np.linalg.norm(arms, axis=1)[:, None])
+    field.residual()
+    return field
+
+
+def test_a_flow_that_would_overturn_a_body_leaves_its_contact():
+    """Pressure all around has no resultant, but turns: from 7 N per vertex on it overturns; contact is the same."""
+    alone, pressed = pressed_disc(0.0), pressed_disc(1e3)
+    assert not positive_definite(pressed._system())
+    assert positive_definite(pressed._upright())
+    assert pressed.contact.active.any()
+    assert pressed.contact.z == pytest.approx(alone.contact.z, rel=1e-9)
