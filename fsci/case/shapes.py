@@ -79,7 +79,7 @@ class ShapeSection(PlacedMesh):
     order: Order = setting(
         "auto",
         "polynomial order of the cells; auto: 2 for an elastic body, but 1 where it may touch in a flow or, if it is "
-        "not slender, with friction or in space",
+        "not slender, with friction or in space, or where a support moves it in a flow",
     )
     if TYPE_CHECKING:
         shape: str

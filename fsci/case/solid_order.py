@@ -28,12 +28,13 @@ def with_order(case: Case, name: str, *, slender: bool = False) -> Mesh:
     For the same time second order has the smaller error, in thick bodies, too (docs/benchmarks.md). Where flows leave
     a gap the films of `q1q1` are as coarse as cells of first order. With friction, nodes at the edge of a quadratic
     surface may stick and slip in turn (`ironing`), and in space a ball that presses a part of one facet may find no
-    equilibrium: only slender bodies, wrong with first order, are worth it.
+    equilibrium: only slender bodies, wrong with first order, are worth it. What a support draws off a wall in a flow
+    has the suction of the new film, in the cell at its end, too: there elements of second order invert.
     """
     mesh = case.elastic_bodies[name].mesh
     if not chooses_order(mesh):
         return mesh
-    fragile = touches(case, name, with_friction=case.dimension == 2)
+    fragile = touches(case, name, with_friction=case.dimension == 2) or _is_drawn(case, name)
     first = name in bodies_that_may_touch(case) or (fragile and not slender)
     return mesh.model_copy(update={"order": 1 if first else 2})
 
@@ -49,3 +50,14 @@ def touches(case: Case, name: str, *, with_friction: bool) -> bool:
     pairs = contact.complete_pairs.values()
     counted = [pair for pair in pairs if not with_friction or (pair.friction is not None and pair.friction.some)]
     return any(side.body == name for pair in counted for _, side in pair.sides)
+
+
+def _is_drawn(case: Case, name: str) -> bool:
+    """Whether a support moves an elastic body that is in a flow."""
+    moved = [one.displacement for one in case.elastic_bodies[name].supports if one.displacement is not None]
+    parts = [part for one in moved for part in (one if isinstance(one, tuple) else (one,))]
+    return (
+        case.fluid is not None
+        and case.coupling is not None
+        and any(part is not None and part.constant != 0.0 for part in parts)
+    )

@@ -264,6 +264,22 @@ def test_order_in_a_flow(tmp_path):
     assert read_body(alone, "beam").cell_type == "quad9"
 
 
+@pytest.mark.parametrize("pulled", ["['0.1*ramp(t,0,1)', 0]", "[0.1, 0]"])
+def test_order_of_what_a_support_draws_through_a_flow(tmp_path, pulled):
+    """First order of thick bodies: elements at the edge of what leaves a wall invert. Slender ones keep second."""
+    more = "structure.dynamics={}", "structure.bodies.beam.material.density=1", "coupling={}", "kinematics=finite"
+    drawn = f"supports=[{{on: left, displacement: {pulled}}}]"
+    thick = "mesh.size=[1, 1]", "mesh.cells=[10, 10]"
+    cases = [
+        (drawn, f"fluid={FLOW}", *more, *thick),
+        (f"fluid={FLOW}", *more, *thick),
+        (drawn, f"fluid={FLOW}", *more),
+        (drawn, *thick),
+    ]
+    found = [read_body(load(tmp_path, *changes), "beam").cell_type for changes in cases]
+    assert found == ["quad", "quad9", "quad9", "quad9"]
+
+
 def test_order_in_check_and_messages(tmp_path):
     (tmp_path / "case.yaml").write_text(BEAM)
     done = fsci("check", tmp_path)
