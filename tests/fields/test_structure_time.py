@@ -213,3 +213,26 @@ def test_no_acceleration_at_the_start():
     ) as failed:
         structure.initialise(0.0, 0.1)
     require_advice(failed.value, FailureKind.NOT_FINITE)
+
+
+def test_the_average_over_a_step_balances_the_average_of_the_loads_of_another_field():
+    """Inertia, stress and damping of a step against (1 - alpha_f) f(t + dt) + alpha_f f(t), at free nodes."""
+    scheme = GeneralisedAlpha.from_rho_inf(0.5)  # alpha_f = 1/3
+    structure = make_structure(
+        block("quad", 2),
+        NeoHooke(40.0, 60.0, 1.0),
+        time=Dynamics(scheme, Damping(mass=2.0, stiffness=1e-3)),
+        settings=TIGHT,
+        supports=[Support("left", vector(0, 0))],
+    )
+    structure.initialise(0.0, 0.01)
+    loads = [np.random.default_rng(seed).normal(size=len(structure.now.u)) for seed in range(3)]
+    for n, load in enumerate(loads):
+        structure.begin_step(0.01 * n, 0.01)
+        structure.load(load)
+        structure.solve()
+        found = structure.held.free_part(structure.time.averaged_load(structure))
+        structure.end_step()
+    wanted = structure.held.free_part(2 / 3 * loads[2] + 1 / 3 * loads[1])
+    assert np.linalg.norm(wanted) > 1.0
+    assert found == pytest.approx(wanted, abs=1e-9)
