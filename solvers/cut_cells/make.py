@@ -8,10 +8,12 @@ from functools import partial
 import numpy as np
 
 from solvers import kernels
-from solvers.api import Array
+from solvers.api import Array, FailureKind, StepFailed
 from solvers.cut_cells.layer import flattened, wall_vertices, walls
 from solvers.cut_cells.surfaces import ClosedSurfaces
 from solvers.cut_cells.table import CutTable
+
+CROSSES = "a surface of this iterate crosses itself or another one, so that it has no inside"
 
 
 class CellCutter:
@@ -63,7 +65,10 @@ class CellCutter:
         try:
             found = self._kernel.cut(vertices, keep)
         except RuntimeError:  # cells of the fast kernel disagree on a face: a surface crosses itself
-            found = self._exact().cut(vertices, False)
+            try:
+                found = self._exact().cut(vertices, False)
+            except RuntimeError as error:
+                raise StepFailed("fluid", FailureKind.DIVERGED, f"{CROSSES}: {error}") from None
         table = CutTable(
             shape=(*self._shape, 1) if self._dim == 2 else self._shape,
             quantum=found.quantum,
