@@ -20,6 +20,6 @@ The ends of zones bound regions, but have no facet and are in no column; their a
 """
 
 from solvers.cut_cells.components import Components, components_of
-from solvers.cut_cells.make import CellCutter, cut_cells
+from solvers.cut_cells.make import CellCutter, CrossingSurfaces, cut_cells
 from solvers.cut_cells.surfaces import ClosedSurfaces
 from solvers.cut_cells.table import CellState, CutTable

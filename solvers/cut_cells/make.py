@@ -8,12 +8,14 @@ from functools import partial
 import numpy as np
 
 from solvers import kernels
-from solvers.api import Array, FailureKind, StepFailed
+from solvers.api import Array
 from solvers.cut_cells.layer import flattened, wall_vertices, walls
 from solvers.cut_cells.surfaces import ClosedSurfaces
 from solvers.cut_cells.table import CutTable
 
-CROSSES = "a surface of this iterate crosses itself or another one, so that it has no inside"
+
+class CrossingSurfaces(RuntimeError):
+    """A surface crosses itself or another one in such a way that it has no inside."""
 
 
 class CellCutter:
@@ -55,7 +57,7 @@ class CellCutter:
         self._exact = partial(kernels.CellCutter, *choices, True)
 
     def cut(self, x: Array, *, keep: bool = True) -> CutTable:
-        """The table of vertices x [m], shape (vertices, dim); keep: cells for the next one."""
+        """The table of vertices x [m], shape (vertices, dim); keep: cells for the next one. Raises CrossingSurfaces."""
         if x.ndim != 2 or x.shape[1] != self._dim:
             raise ValueError(f"vertices must have the shape (n, {self._dim}), not {x.shape}")
         if not np.isfinite(x).all():
@@ -68,7 +70,7 @@ class CellCutter:
             try:
                 found = self._exact().cut(vertices, False)
             except RuntimeError as error:
-                raise StepFailed("fluid", FailureKind.DIVERGED, f"{CROSSES}: {error}") from None
+                raise CrossingSurfaces(*error.args) from None
         table = CutTable(
             shape=(*self._shape, 1) if self._dim == 2 else self._shape,
             quantum=found.quantum,

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.api import Array, State
+from solvers.api import Array, FailureKind, NoResidual, State
+from solvers.cut_cells import CrossingSurfaces
 from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
@@ -28,6 +29,8 @@ from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.time_scheme import FlowStep
 from solvers.fluid.surfaces.immersed import ImmersedBody
 from solvers.fluid.surfaces.surface import Motion, tied, wetness
+
+NO_INSIDE = "an iterate has a surface that crosses itself or another one, so that it has no inside"
 
 #: Thickness in cells up to which moving bodies have separate cells with contact, by dimension: in 2D that of bodies at
 #: rest. Where thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its
@@ -132,19 +135,22 @@ class ThinBodies:
         off = off_boundary(self._grid, x[facets])
         thin, always = THIN_IF_MOVING, self.follows
         ties = None if self._tied is None else (self._tied, self._wet)
-        return find_sheets(
-            self._grid,
-            facets,
-            x,
-            off,
-            thin=thin if self._thin else 0,
-            always=always,
-            closing=self._may_close,
-            joined=joined,
-            tied=ties,
-            repeated=self._repeated,
-            before=self._sheets,
-        )
+        try:
+            return find_sheets(
+                self._grid,
+                facets,
+                x,
+                off,
+                thin=thin if self._thin else 0,
+                always=always,
+                closing=self._may_close,
+                joined=joined,
+                tied=ties,
+                repeated=self._repeated,
+                before=self._sheets,
+            )
+        except CrossingSurfaces as error:  # on all processes, which have the same surfaces and the whole grid
+            raise NoResidual("fluid", FailureKind.DIVERGED, f"{NO_INSIDE}: {error}") from None
 
     def release(self, facets: NDArray[np.int64], motion: Motion) -> bool:
         """Let parts go that a cycle joins, at a solution; returns whether it has other unknowns without them.
