@@ -2,43 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE, save_figure
+from fsci.plot.curves import CURVE_DOTS, CURVE_STYLE, save_figure
 from fsci.plot.render import axes_of_view, frame, import_pyvista, photograph
 from fsci.plot.scene import draw_triad
 from fsci.plot.units import label, literal
+from fsci.preview.legend import (
+    LEGEND,
+    MARK_COLOURS,
+    NEAR,
+    OTHER_PATCH,
+    PATCHES,
+    ROW,
+    add_below,
+    add_beside,
+    colours_of,
+    handles,
+    height_below,
+)
 from fsci.preview.parts import DistantPair, NamedSurface, Preview
 from solvers.api import Array
 
 WIDTH = 11.0  #: of the picture with its legend [inch]
-LEGEND = 3.4  #: of that for the legend [inch]
-HEIGHTS = (4.0, 9.0)  #: least and largest [inch]
+HEIGHT = 8.0  #: of the axes of the highest one [inch]
+WIDE = 0.5  #: height of a scene over its width, up to which its legend is below
+ROOM_AROUND = 0.03  #: around a scene in the plane, of its size
+NAME_BOX = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.6}
 MANY_LINES = 400  #: of the grid along an axis, from which they are left out: they would cover everything
 MANY_NAMES = 15  #: bodies, from which the legend alone has their names
-MANY_ENTRIES = 40  #: of the legend
 FILLED = {"elastic": 0.55, "free": 0.55, "moved": 0.35, "rigid": 0.25, "obstacle": 0.25}  #: kind -> opacity
-# Bodies have COLOURS; what is no body has others.
-PATCHES = {"no slip": "black", "velocity": "#00207f", "outflow": "#5f7f1f", "periodic": "#7f5f1f"}
-MARK_COLOURS = {
-    "support": "black",
-    "spring": "dimgray",
-    "traction": "#8b2500",
-    "pressure": "#8b3a8b",
-    "force": "#8b2500",
-    "motion": "#006400",
-    "velocity": PATCHES["velocity"],
-}
-OTHER_PATCH = "#7f7f7f"
 ARROW_LENGTH = 0.08  #: of the scene's size
-NEAR = "#cc0000"  #: of the line between the surfaces of a pair
-
-Entry = tuple[Any, str, str]  #: colour, words, marker of a point or line; empty: a surface
 
 
 def draw(path: Path, scene: Preview, units: Mapping[str, str]) -> None:
@@ -46,46 +45,18 @@ def draw(path: Path, scene: Preview, units: Mapping[str, str]) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    corners = np.concatenate([part.corners.reshape(-1, part.corners.shape[2]) for part in scene.bodies + scene.patches])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    if scene.box is not None:  # a body that reaches far out of the box would make all else small
-        margin = 0.15 * (scene.box[1] - scene.box[0])
-        low, high = np.maximum(low, scene.box[0] - margin), np.minimum(high, scene.box[1] + margin)
+    low, high = extent(scene)
+    shown = handles(scene, units["length"])
     with matplotlib.rc_context({**CURVE_STYLE, "axes.grid": False, "font.size": 10}):
         if len(low) == 2:
-            slope = float((high - low)[1] / max((high - low)[0], 1e-300))
-            figure = Figure((WIDTH, float(np.clip((WIDTH - LEGEND) * slope + 1.0, *HEIGHTS))), dpi=CURVE_DOTS)
-            axes = figure.add_axes((0.7 / WIDTH, 0.12, (WIDTH - LEGEND - 0.9) / WIDTH, 0.80))
-            _draw_plane(axes, scene, low, high, units)
+            figure = figure_of_plane(high - low + 2.0 * ROOM_AROUND * (high - low).max(), shown)
+            _draw_plane(figure.axes[0], scene, low, high, units)
         else:
             figure = Figure((WIDTH, 7.0), dpi=CURVE_DOTS)
             _draw_space(figure, scene, low, high)
-        figure.suptitle(literal(scene.title), x=0.02, ha="left", y=0.985)
-        _add_legend(figure, scene, units["length"])
+            add_beside(figure, shown)
+        figure.suptitle(literal(scene.title), x=0.02, ha="left", y=1.0 - 0.1 / figure.get_figheight())
         save_figure(figure, path)
-
-
-def colours_of(bodies: list[NamedSurface]) -> list[str]:
-    """One for each body; more bodies than colours share them."""
-    return [COLOURS[number % len(COLOURS)] for number in range(len(bodies))]
-
-
-def entries(scene: Preview, unit: str) -> Iterator[Entry]:
-    """The legend: what has which colour."""
-    for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
-        yield colour, f"{part.name} ({part.kind})", ""
-    for part in scene.marks:
-        yield MARK_COLOURS[part.kind], f"{part.kind} on {part.name}", ""
-    for point in scene.points:
-        yield MARK_COLOURS[point.kind], f"{point.kind} at a point of {point.name}", "^"
-    for pair in scene.pairs:
-        yield NEAR, f"pair {words_of(pair, unit)}", "."
-    for part in scene.patches:
-        yield PATCHES.get(part.kind, OTHER_PATCH), f"patch {part.name} ({part.kind})", ""
-    for kind in sorted({arrow.kind for arrow in scene.arrows} & {"motion"}):
-        yield MARK_COLOURS[kind], "begins to move", "$\\rightarrow$"
-    for name in scene.probes:
-        yield "black", f"probe {name}", "+"
 
 
 def closest(pairs: list[DistantPair]) -> list[DistantPair]:
@@ -98,6 +69,31 @@ def closest(pairs: list[DistantPair]) -> list[DistantPair]:
     return list(found.values())
 
 
+def name_place(part: NamedSurface, low: Array, high: Array) -> Array:
+    """Where the name of a body stands [m]: in its middle, in the plane amid its widest piece at that height.
+
+    The middle of a ring is in its hole.
+    """
+    middle = np.clip(part.middle, low, high)
+    if len(middle) == 3:
+        return middle
+    (ax, ay), (bx, by) = part.corners.transpose(1, 2, 0)
+    cut = (ay > middle[1]) != (by > middle[1])
+    places = ax[cut] + (bx - ax)[cut] * (middle[1] - ay[cut]) / (by - ay)[cut]
+    pieces = np.clip(np.sort(places), low[0], high[0]).reshape(-1, 2)
+    widest = pieces[np.argmax(np.ptp(pieces, axis=1))] if len(pieces) else middle[[0, 0]]
+    return np.array([widest.mean(), middle[1]])
+
+
+def opacity(part: NamedSurface, bodies: Sequence[NamedSurface]) -> float:
+    """In space a body is solid unless it would hide another one that is within the box around it."""
+    if part.corners.shape[2] == 2:
+        return FILLED[part.kind]
+    low, high = part.corners.min(axis=(0, 1)), part.corners.max(axis=(0, 1))
+    others = [body.corners for body in bodies if body is not part]
+    return 0.3 if any(np.all(corners >= low) and np.all(corners <= high) for corners in others) else 1.0
+
+
 def arrow_ends(scene: Preview, size: float) -> Iterator[tuple[Array, str]]:
     """(from, to) of each arrow, shape (2, dim) [m], and its kind: loads end at the point that has them.
 
@@ -108,38 +104,41 @@ def arrow_ends(scene: Preview, size: float) -> Iterator[tuple[Array, str]]:
         yield arrow.at + ARROW_LENGTH * size * np.outer(ends, arrow.direction), arrow.kind
 
 
-def words_of(pair: DistantPair, unit: str) -> str:
-    """Its surfaces and how far they are apart."""
-    slave, master = pair.sides
-    apart = f"{pair.distance:.4g} {unit} apart" if pair.distance > 0.0 else "touching"
-    return f"{pair.name}: {slave.name}, {master.name}, {apart}"
-
-
-def _add_legend(figure: Any, scene: Preview, unit: str) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    found = list(entries(scene, unit))
-    if len(found) > MANY_ENTRIES:
-        found = [*found[: MANY_ENTRIES - 1], ("white", f"and {len(found) - MANY_ENTRIES + 1} more", "")]
-    handles: list[Any] = []
-    for colour, words, marker in found:
-        text = literal(_short(words))
-        if marker:
-            looks: Any = {"color": colour, "marker": marker, "linestyle": "-" if marker == "." else ""}
-            handles.append(Line2D([], [], label=text, **looks))
-        else:
-            handles.append(Patch(color=colour, label=text))
-    place = {"loc": "upper left", "bbox_to_anchor": (1.0 - LEGEND / WIDTH, 0.94)}
-    figure.legend(handles=handles, fontsize=8 if len(handles) <= 25 else 6, **place)
-
-
-def _short(words: str) -> str:
-    """At most 54 characters; what is at the end is what matters of a pair: its distance."""
-    return words if len(words) <= 54 else f"{words[:31]}...{words[-20:]}"
-
-
 # ------------------------------------------------------------------------------------------------------- the plane
+
+
+def extent(scene: Preview) -> tuple[Array, Array]:
+    """Low and high corner of what is drawn [m]; a body that reaches far out of the box would make all else small."""
+    corners = np.concatenate([part.corners.reshape(-1, part.corners.shape[2]) for part in scene.bodies + scene.patches])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if scene.box is None:
+        return low, high
+    margin = 0.15 * (scene.box[1] - scene.box[0])
+    return np.maximum(low, scene.box[0] - margin), np.minimum(high, scene.box[1] + margin)
+
+
+def figure_of_plane(size: Array, shown: list[Any]) -> Any:
+    """With axes for a scene of this size, and its legend below a wide scene, beside others."""
+    from matplotlib.figure import Figure
+
+    slope = float(size[1] / max(size[0], 1e-300))
+    left, under, over = 0.8, 0.6, 0.5  # [inch] beside, below and above the axes
+    if slope < WIDE:
+        width, below = WIDTH - left - 0.2, under + height_below(shown)
+        height = max(width * slope, 0.5)
+        figure = Figure((WIDTH, height + below + over), dpi=CURVE_DOTS)
+        add_below(figure, shown)
+    else:
+        width, below = WIDTH - LEGEND - left - 0.2, under
+        height = min(width * slope, HEIGHT)
+        width = height / slope
+        figure = Figure(
+            (width + left + 0.2 + LEGEND, max(height + below + over, ROW * len(shown) + 1.0)), dpi=CURVE_DOTS
+        )
+        add_beside(figure, shown)
+    total, high = figure.get_size_inches()
+    figure.add_axes((left / total, 1.0 - (height + over) / high, width / total, height / high))
+    return figure
 
 
 def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mapping[str, str]) -> None:
@@ -159,8 +158,8 @@ def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mappi
         axes.add_patch(PathPatch(path, facecolor=colour, alpha=FILLED[part.kind], edgecolor="none", zorder=2))
         axes.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=1.2, zorder=3))
         if len(scene.bodies) < MANY_NAMES:
-            x, y = np.clip(part.middle, low, high)
-            axes.text(x, y, literal(part.name), ha="center", va="center", fontsize=9, zorder=8)
+            x, y = name_place(part, low, high)
+            axes.text(x, y, literal(part.name), ha="center", va="center", fontsize=9, zorder=8, bbox=NAME_BOX)
     for part in scene.patches:
         colour = PATCHES.get(part.kind, OTHER_PATCH)
         axes.add_collection(LineCollection(list(part.corners), colors=colour, linewidths=3.0, zorder=4, clip_on=False))
@@ -178,7 +177,7 @@ def _draw_plane(axes: Any, scene: Preview, low: Array, high: Array, units: Mappi
     for ends, kind in arrow_ends(scene, float((high - low).max())):
         looks = {"arrowstyle": "-|>", "color": MARK_COLOURS[kind], "linewidth": 1.8, "mutation_scale": 14}
         axes.annotate("", ends[1], ends[0], arrowprops={**looks, "shrinkA": 0, "shrinkB": 0}, zorder=9)
-    margin = 0.03 * (high - low).max()
+    margin = ROOM_AROUND * (high - low).max()
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")
@@ -236,11 +235,9 @@ def _draw_space(figure: Any, scene: Preview, low: Array, high: Array) -> None:
                 algorithm="dataset_surface"
             )
         if surface.n_points:
-            plotter.add_mesh(
-                surface, color=colour, opacity=1.0 if part.kind in ("elastic", "free") else 0.5, ambient=0.4
-            )
+            plotter.add_mesh(surface, color=colour, opacity=opacity(part, scene.bodies), ambient=0.4)
     for part in scene.marks:
-        plotter.add_mesh(_triangles(part.corners), color=MARK_COLOURS[part.kind], opacity=0.8, lighting=False)
+        plotter.add_mesh(_triangles(part.corners), color=MARK_COLOURS[part.kind], opacity=0.5, lighting=False)
     for part in scene.patches:
         plotter.add_mesh(
             _triangles(part.corners), color=PATCHES.get(part.kind, OTHER_PATCH), opacity=0.08, lighting=False

@@ -10,18 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.preview.draw import (
-    FILLED,
-    MARK_COLOURS,
-    NEAR,
-    OTHER_PATCH,
-    PATCHES,
-    arrow_ends,
-    closest,
-    colours_of,
-    loops_of,
-    words_of,
-)
+from fsci.preview.draw import FILLED, arrow_ends, closest, extent, loops_of, name_place, opacity
+from fsci.preview.legend import MARK_COLOURS, NEAR, OTHER_PATCH, PATCHES, colours_of, words_of
 from fsci.preview.parts import NamedSurface, Preview
 from fsci.running.files import write_text
 from solvers.api import Array
@@ -129,23 +119,22 @@ def write_page(path: Path, scene: Preview, units: Mapping[str, str]) -> None:
 
 def _parts(scene: Preview, unit: str) -> Iterator[dict[str, Any]]:
     """What is drawn, each with its line of the legend; the first ones are covered by later ones in the plane."""
+    low, high = extent(scene)
     if scene.box is not None:
         yield _part("grid", "#d8d8d8", *_grid(scene), width=0.5, words="grid")
     for part in scene.patches:
         words = f"patch {part.name} ({part.kind})"
         yield _surface(part, PATCHES.get(part.kind, OTHER_PATCH), PATCH_OPACITY, words)
     for part, colour in zip(scene.bodies, colours_of(scene.bodies), strict=True):
-        opacity = 1.0 if part.kind in ("elastic", "free") and part.corners.shape[2] == 3 else FILLED[part.kind]
-        label = _in_space(part.middle[None])[0].tolist()
-        yield {**_surface(part, colour, opacity, f"{part.name} ({part.kind})"), "label": label}
+        label = _in_space(name_place(part, low, high)[None])[0].tolist()
+        yield {**_surface(part, colour, opacity(part, scene.bodies), f"{part.name} ({part.kind})"), "label": label}
     for part in scene.marks:
         yield _surface(part, MARK_COLOURS[part.kind], 0.8, f"{part.kind} on {part.name}", lines=True)
     drawn = {pair.name for pair in closest(scene.pairs)}
     for pair in scene.pairs:
         lines = [[0, 1]] if pair.name in drawn else []
         yield {**_part(pair.name, NEAR, pair.ends, lines, width=3, words=f"pair {words_of(pair, unit)}"), "top": True}
-    size = 0.01 * float(np.ptp(np.concatenate([part.corners.reshape(-1, part.corners.shape[2])
-                                               for part in scene.bodies + scene.patches]), axis=0).max())  # fmt: skip
+    size = 0.01 * float((high - low).max())
     for ends, kind in arrow_ends(scene, 100.0 * size):
         yield {**_part(kind, MARK_COLOURS[kind], *_head(ends), width=3, words=""), "top": True}
     points = [(p.name, MARK_COLOURS[p.kind], p.at, f"{p.kind} at a point of {p.name}") for p in scene.points]

@@ -68,7 +68,8 @@ class DistantPair:
     def distance(self) -> float:
         """[m]; zero where it is the rounding of coordinates."""
         found = float(np.linalg.norm(self.ends[1] - self.ends[0]))
-        return found if found > SAME_PLACE * np.abs(self.ends).max() else 0.0
+        largest = max(float(np.abs(side.corners).max()) for side in self.sides)
+        return found if found > SAME_PLACE * largest else 0.0
 
 
 @dataclass(frozen=True)

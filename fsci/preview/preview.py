@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fsci.case import load_case
-from fsci.preview.draw import draw, words_of
+from fsci.preview.draw import draw
+from fsci.preview.legend import words_of
 from fsci.preview.page import write_page
 from fsci.preview.parts import preview_of
 

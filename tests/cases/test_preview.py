@@ -10,10 +10,12 @@ from PIL import Image
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.preview.draw import closest, entries, loops_of
-from fsci.preview.parts import nearest, preview_of
+from fsci.preview.draw import closest, figure_of_plane, loops_of, name_place, opacity
+from fsci.preview.legend import entries, handles
+from fsci.preview.parts import DistantPair, NamedSurface, Preview, nearest, preview_of
 from solvers.mesh.distance import distances_in_pairs
 
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
 PLANE = """
 title: All kinds
 time: {step: 0.1, end: 1}
@@ -198,6 +200,50 @@ def test_a_patch_on_a_part_of_a_face_is_that_part(tmp_path):
 def test_surfaces_that_touch_but_for_rounding_touch(tmp_path):
     scene = preview_of(written(tmp_path, SPACE.replace("0.52]", "0.50000000000000011]")))
     assert "pair blocks: high.bottom, low.top, touching" in [text for _, text, _ in entries(scene, "m")]
+
+
+def test_surfaces_that_touch_at_the_origin_touch():
+    """What counts is the size of the surfaces, not of the coordinates where they touch."""
+    ends = np.array([[0.0, 0.0], [0.0, 3e-14]])
+    sides = [NamedSurface(name, "slave", np.array([[[0.0, y], [12.0, y]]])) for name, y in (("a", 0.0), ("b", 3e-14))]
+    assert DistantPair("pair", (sides[0], sides[1]), ends).distance == 0.0
+
+
+def circle(radius):
+    points = radius * np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    return np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+
+
+def test_the_name_of_a_ring_is_in_the_ring():
+    """Its middle is in the hole; of what reaches out of the picture the name is in the picture."""
+    ring = NamedSurface("ring", "elastic", np.concatenate([circle(1.0), circle(0.8)[:, ::-1]]))
+    low, high = np.array([-2.0, -2.0]), np.array([2.0, 2.0])
+    x, y = name_place(ring, low, high)
+    assert 0.8 < np.hypot(x, y) < 1.0
+    x, y = name_place(ring, np.array([0.9, -2.0]), high)
+    assert 0.9 < x < 1.0
+
+
+def test_what_would_hide_another_body_is_seen_through():
+    corners = np.eye(3)[None] * np.array([1.0, 0.5])[:, None, None] + np.array([0.0, 0.1])[:, None, None]
+    outer, inner = (NamedSurface(name, "elastic", facets[None]) for name, facets in zip("oi", corners, strict=True))
+    assert opacity(outer, [outer, inner]) < opacity(inner, [outer, inner]) == 1.0
+
+
+@pytest.mark.parametrize("size", [(10.0, 1.0), (1.0, 1.0), (1.0, 10.0)])
+def test_scene_and_legend_share_the_picture(size):
+    """The axes have the shape of the scene; the legend covers no part of them and is in the picture."""
+    shown = handles(Preview("", [], [], [], [], {str(n): np.zeros(2) for n in range(20)}, [], []), "m")
+    figure = figure_of_plane(np.array(size), shown)
+    figure.draw_without_rendering()
+    axes, legend = (found.get_window_extent() for found in (figure.axes[0], figure.legends[0]))
+    assert axes.height / axes.width == pytest.approx(size[1] / size[0])
+    assert not axes.overlaps(legend)
+    assert figure.bbox.x0 <= legend.x0
+    assert legend.x1 <= figure.bbox.x1
+    assert figure.bbox.y0 <= legend.y0
+    if size[0] > size[1]:
+        assert axes.width > 0.9 * figure.bbox.width
 
 
 def test_one_line_for_two_bodies(tmp_path):
