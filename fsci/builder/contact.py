@@ -80,11 +80,13 @@ def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodie
             sides.append(found[key])
         law = named(laws, settings.law)(*settings.law_parameters)
         deep = facets_in_each_other(case, comm, settings, meshes)
-        pairs.append(Pair(sides[0], sides[1], settings.integration, law, deep, _interference(settings), always=in_flow))
+        pairs.append(
+            Pair(sides[0], sides[1], settings.integration, law, deep, interference_of(settings), always=in_flow)
+        )
     return pairs
 
 
-def _interference(pair: PairSection) -> Callable[[float], float] | None:
+def interference_of(pair: PairSection) -> Callable[[float], float] | None:
     """A function: time [s] -> overlap [m] of the bodies as meshed."""
     formula = pair.interference
     return None if formula is None else lambda t: float(formula(np.zeros((3, 1)), t)[0])

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -147,6 +148,7 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         from fsci.builder.wall_pairs import wall_pairs
         from fsci.check.damped_modes import alternating
         from fsci.check.dry_facets import dry_facets
+        from fsci.check.faceted_fits import faceted_fits
         from fsci.check.stiff_slaves import stiff_slaves
         from fsci.check.unpaired import unpaired
 
@@ -164,8 +166,9 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
         found.notes += list(alternating(case, found.meshes))
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in dry_facets(case, bodies)]
-        stiff = stiff_slaves(case, found.meshes, found.pairs)  # none of those that the program finds
-        found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in stiff]
+        of_pairs = [stiff_slaves(case, found.meshes, found.pairs), faceted_fits(case, found.meshes, found.pairs)]
+        said_of_pairs = chain.from_iterable(of_pairs)  # of none that the program finds
+        found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in said_of_pairs]
 
 
 def _own_laws(case: Case, found: Findings) -> None:

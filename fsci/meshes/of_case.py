@@ -76,8 +76,10 @@ def read_body(case: Case, name: str) -> Mesh:
     try:
         mesh = _elastic_mesh(case, name, with_order(case, name))
         _require_dimension(case, name, mesh)
-        if CELL_TYPES[mesh.cell_type].degree == 1 and chooses_order(settings.mesh) and is_slender(mesh):
-            mesh = _elastic_mesh(case, name, with_order(case, name, slender=True))
+        if CELL_TYPES[mesh.cell_type].degree == 1 and chooses_order(settings.mesh):
+            slender, fitted = is_slender(mesh), _is_fitted(case, name, mesh)
+            if (chosen := with_order(case, name, slender=slender, fitted=fitted)).order == 2:
+                mesh = _elastic_mesh(case, name, chosen)
         _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
             keys = ("structure", "bodies", name, "element")
@@ -108,6 +110,16 @@ def _elastic_mesh(case: Case, name: str, settings: MeshSection) -> Mesh:
         return extract_region(mesh, region)
     except MeshError as error:
         raise case.error(("structure", "bodies", name, "region"), str(error)) from None
+
+
+def _is_fitted(case: Case, name: str, mesh: Mesh) -> bool:
+    """Whether an elastic body has contact by interference only, on surfaces without an end."""
+    if case.contact is None or case.contact.bodies is not None:
+        return False
+    pairs = [pair for pair in case.contact.pairs.values() if name in {side.body for _, side in pair.sides}]
+    surfaces = [side.on for pair in pairs for _, side in pair.sides if side.body == name]
+    closed = all(is_closed(tessellate(mesh, on)[0]) for on in surfaces)
+    return closed and all(pair.interference is not None for pair in pairs)
 
 
 def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:
