@@ -20,7 +20,7 @@ from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.friction import FrictionBound, reversing
-from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
+from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
 from solvers.contact.pair import Pair
@@ -29,9 +29,9 @@ from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
-from solvers.contact.unheld import nearest_gaps, slips_freely
+from solvers.contact.unheld import nearest_gaps, slips_freely, untouched
 from solvers.contact.violation import rounding, violation
-from solvers.contact.work import FrictionWork, GivenWork
+from solvers.contact.work import FrictionWork, GivenWork, along_surface
 
 #: Gap that is the rounding of positions, relative to the extent of all surfaces, and to their distance from the origin.
 GAP_OF_EXTENT, GAP_OF_DISTANCE = 1e-12, 1e-15
@@ -140,8 +140,7 @@ class Contact:
         cycled, self._begun = self.active_set.returned & self._begun, True
         self.active_set.begin_step()
         self._integration.begin_step(self.x, self.active_set.active, cycled)
-        self._condensation = None
-        self.slip = None
+        self._condensation = self.slip = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
 
     def begin_solve(self) -> None:
@@ -180,9 +179,8 @@ class Contact:
         """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
         if self.terms is None or self.slip is None:
             return np.zeros_like(self.z), np.zeros_like(self.z)
-        tangent = along(self.terms.normals) * self.active_set.active[:, None, None]
-        slip = np.einsum("nij,nj->ni", tangent, self.slip.values)
-        return self._D[:, None] * np.einsum("nij,nj->ni", tangent, self.z), slip
+        active = self.active_set.active[:, None]
+        return along_surface(self.terms.normals, active * self._D[:, None] * self.z, active * self.slip.values)
 
     def evaluate(self, u: Array, t: float) -> None:
         """Compute mortar terms and active set at displacements u [m], shape (N, dim), and the time t [s]."""
@@ -190,6 +188,9 @@ class Contact:
         self._integration.move(x - self.x)
         self.x, self.time = x, t
         self._integration.interfere(t)
+        if self.active_set.first and self._unheld:
+            alone = untouched(self._unheld, self.terms, self.active_set.active)
+            self._integration.look_farther(alone, x, self.x_old, self._constraints.coverage.enough)
         if self._integration.clear:
             return
         self._choose()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -22,6 +22,7 @@ from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Normals, Terms, find_normals, total_terms
 from solvers.contact.ties import Ties
+from solvers.contact.unheld import look_farther
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,21 @@ class Integration:
         self._nothing_near, self._travel = False, 0.0
         for mortar in self._mortars:
             mortar.clear_until = -np.inf
+
+    def look_farther(
+        self, alone: Sequence[Sequence[int]], x: Array, x_old: Array, enough: Callable[[Array], NDArray[np.bool_]]
+    ) -> None:
+        """Let bodies find in this solve what is far away; arguments as of `unheld.look_farther`.
+
+        alone: numbers of the pairs of each of them.
+        """
+        for mortar in self._mortars:
+            mortar.farther = 0.0
+        for pairs in alone:
+            mine = [mortar for mortar in self._mortars if np.isin(mortar.masters.pair, pairs).any()]
+            if mine:
+                look_farther(mine, self._multipliers, x, x_old, enough)
+        self.search_anew()
 
     def begin_step(self, x: Array, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
         """Begin a step at the positions x [m], shape (N, dim); masks, shape (C,).

@@ -130,6 +130,7 @@ class Mortar:
         self._deep = np.empty(0, dtype=np.int64) if deep is None else np.unique(self._codes(deep))
         self._first: list[Array] = []  # positions [m] of both sides at the start, if facets are deep there
         self.interference = 0.0  #: largest overlap [m] that a pair asks for at present
+        self.farther = 0.0  #: by which the reach is larger in this solve [m], see `unheld`
         self.clear_until = -np.inf  #: travel [m], see `near`, up to which no facets can be near
 
     def start(self, x: Array) -> None:
@@ -180,8 +181,8 @@ class Mortar:
     ) -> tuple[NDArray[np.int32], float]:
         """(facet pairs that may touch, the length [m] by which their reach is larger); x: positions [m] of all nodes.
 
-        The reach grows by the largest motion of a node in this step, by the interference and by `beyond` [m], at most
-        one edge.
+        The reach grows by the largest motion of a node in this step, by the interference, by what a body that nothing
+        holds looks farther, and by `beyond` [m], at most one edge.
 
         travel: upper bound of the path of any node so far [m]. When it has increased by s, each of the two boxes has
         grown by s at most, and the motion of a step, which inflates them, by 2 s. Hence boxes with a clearance of 4 s
@@ -191,7 +192,7 @@ class Mortar:
             return np.empty((0, 2), dtype=np.int32), 0.0
         slave, master = self.patch.nodes, self.masters.nodes
         ways = (np.linalg.norm(x[nodes] - x_previous[nodes], axis=1) for nodes in (slave, master))
-        motion = max(float(way.max(initial=0.0)) for way in ways) + max(self.interference, 0.0) + beyond
+        motion = max(float(way.max(initial=0.0)) for way in ways) + max(self.interference, 0.0) + self.farther + beyond
         at_masters = self._at_masters(x), self._at_masters(x_previous)
         found = self.search.pairs(x[slave], at_masters[0], self.edge + motion, x_previous[slave], at_masters[1])
         self.clear_until = travel + (self.search.clearance - (self.edge - beyond)) / 4.0
@@ -275,6 +276,10 @@ class Mortar:
         slave = self.patch.nodes
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
         return sparse(result.W, (len(slave), len(slave))).T @ np.ones(len(slave))
+
+    def areas(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32], motion: float) -> Array:
+        """Covered areas [m^(dim-1)], shape (ns,); arguments as of `evaluate`."""
+        return self._kernel(x, normals, facet_pairs, derivatives=False, **self._reach(motion)).D
 
     def gap_vectors(
         self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32]

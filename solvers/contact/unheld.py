@@ -1,8 +1,8 @@
 """Statics of bodies that only contact holds.
 
 Without a node in contact their equilibrium has no solution, although they may be free just until they touch. So the
-first iterate of a solve tries the node that is nearest. If it would pull, the next iterate opens it, and what is left
-is singular as before: which nodes are tried does not change a solution.
+first iterate of a solve tries the node that is nearest, at any distance. If it would pull, the next iterate opens it,
+and what is left is singular as before: which nodes are tried does not change a solution.
 
 If friction alone holds a body along its contacts and all its nodes slip in an iterate, it has no stiffness there:
 rounding would decide how far it moves. Such nodes get a slope of the traction over the slip (see `friction_rows`).
@@ -10,13 +10,53 @@ rounding would decide how far it moves. Such nodes get a slope of the traction o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.law.law import SLIP, STICK, Statuses
+from solvers.contact.mortar import Mortar
+from solvers.contact.patch import Multipliers
+from solvers.contact.terms import Terms
+
+
+def untouched(bodies: Sequence[Sequence[int]], terms: Terms | None, active: NDArray[np.bool_]) -> list[Sequence[int]]:
+    """The bodies without a multiplier in contact; terms: None where no facets are near, the rest as below."""
+    if terms is None:
+        return list(bodies)
+    return [pairs for pairs in bodies if not active[(terms.D_of_pair[list(pairs)] > 0.0).any(axis=0)].any()]
+
+
+def look_farther(
+    mortars: Sequence[Mortar],
+    multipliers: Multipliers,
+    x: Array,
+    x_old: Array,
+    enough: Callable[[Array], NDArray[np.bool_]],
+) -> None:
+    """Let the mortars of a body reach as far as it takes to cover one multiplier, at most the extent of all nodes.
+
+    x, x_old: positions [m], now and at the start of the step; enough: mask of the multipliers that areas (C,) cover.
+    """
+    distance, farthest = 0.0, float(np.ptp(x, axis=0).max())
+    while not enough(_areas(mortars, multipliers, x, x_old)).any() and distance < farthest:
+        distance = max(2.0 * distance, min(mortar.edge for mortar in mortars))
+        for mortar in mortars:
+            mortar.farther = distance
+
+
+def _areas(mortars: Sequence[Mortar], multipliers: Multipliers, x: Array, x_old: Array) -> Array:
+    """Covered areas [m^(dim-1)], shape (C,)."""
+    found = np.zeros(len(multipliers.node))
+    for mortar in mortars:
+        mortar.clear_until = -np.inf
+        facet_pairs, motion = mortar.near(x, x_old)
+        if len(facet_pairs):
+            normals = mortar.patch.normals(x[mortar.patch.nodes])[0]
+            found[mortar.patch.multipliers] += mortar.areas(x, normals, facet_pairs, motion)
+    return found
 
 
 def nearest_gaps(bodies: Sequence[Sequence[int]], of_pair: Array, mean_gap: Array, active: NDArray[np.bool_]) -> Array:

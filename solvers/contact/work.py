@@ -5,6 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.api import Array, State
+from solvers.contact.law.law import along
+
+
+def along_surface(normals: Array, force: Array, slip: Array) -> tuple[Array, Array]:
+    """The parts of forces [N] and slips [m] along the surface, all of shape (C, dim)."""
+    tangent = along(normals)
+    return np.einsum("nij,nj->ni", tangent, force), np.einsum("nij,nj->ni", tangent, slip)
 
 
 class FrictionWork:

@@ -55,6 +55,7 @@ class RigidBodies:
     ):
         self.bodies, self.scheme, self.tolerance, self.springs = list(bodies), scheme, tolerance, springs
         self.comm, self.timer, self.contact = comm, timer or Timer(), contact
+        self.static = not any(body.inertia.mass for body in bodies)
         self.dim, self.extents = bodies[0].dim, np.array([body.extent for body in bodies])
         self.components = UNKNOWNS[self.dim]
         self.unknowns = len(bodies) * len(self.components)  #: count on all processes
@@ -124,9 +125,9 @@ class RigidBodies:
         self.set_increments(self._held_u)
 
     def extrapolate(self) -> None:
-        """Predictor: free components keep their velocity."""
+        """Predictor: free components keep their velocity; in statics they stay, as those of elastic bodies do."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
-        u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
+        u[:, self.components] += np.where(self._free & (not self.static), path, 0.0).reshape(len(u), -1)
         self._last = u - self._u
         self.set_increments(u)
 
@@ -174,8 +175,7 @@ class RigidBodies:
 
     def _end_contact(self) -> None:
         self.balance = self._own_balance()
-        statics = not any(body.inertia.mass for body in self.bodies)
-        if self.contact is None or statics or not self.contact.active.any():
+        if self.contact is None or self.static or not self.contact.active.any():
             return
         inertia = np.array([motion.mass(body, now.R) for body, now in zip(self.bodies, self.now, strict=True)])
         mass = block_diagonal(self._without_held(inertia[:, self.components][:, :, self.components]))

@@ -34,6 +34,8 @@ def run(folder, text):
 @pytest.mark.parametrize(("old", "new"), [
     ("time:", "time:"),
     ("origin: [1.05, -1]", "origin: [1.1, -1]"),
+    ("origin: [1.05, -1]", "origin: [1.9, -1]"),
+    ("size: [1, 1], cells: [2, 2]", "size: [1, 1], cells: [9, 8]"),
     ("cells: [2, 2]", "cells: [3, 3], order: 2"),
     ("cells: [2, 2]", "cells: [4, 3], cell: tri"),
     ("{slave: {body: block, on: right}, master: {obstacle: wall}}",
@@ -41,7 +43,7 @@ def run(folder, text):
     ("step: 0.5", "step: 0.25"),
 ])  # fmt: skip
 def test_it_reaches_the_wall_and_hands_its_load_over(tmp_path, old, new):
-    """The node that is nearest is tried: statics has an answer once it touches."""
+    """The node that is nearest is tried, however far it is in cells: statics has an answer once it touches."""
     assert old in CASE
     done = run(tmp_path, CASE.replace(old, new))
     assert done.returncode == 0, done.stderr
@@ -64,13 +66,19 @@ def test_the_nearest_node_of_each_body():
     assert nearest_gaps([[0, 1]], of_pair, gap, np.array([True, False, False, False])) == pytest.approx([0.0] * 4)
 
 
-@pytest.mark.parametrize(("old", "new"), [("100*t", "-100*t"), ("origin: [1.05, -1]", "origin: [9, -1]")])
-def test_what_goes_away_or_is_far_has_no_place_and_is_told_what_helps(tmp_path, old, new):
-    done = run(tmp_path, CASE.replace(old, new))
+def test_what_goes_away_has_no_place_and_is_told_what_helps(tmp_path):
+    done = run(tmp_path, CASE.replace("100*t", "-100*t"))
     assert done.returncode == 1
     words = done.stdout + done.stderr
     assert "is far larger than the body, 1: is a body not supported? One that is free until it touches needs" in words
     assert "weak 'springs', a pair with 'adjust', or 'dynamics'" in words
+
+
+def test_a_way_of_many_sizes_is_a_leap(tmp_path):
+    done = run(tmp_path, CASE.replace("origin: [1.05, -1]", "origin: [9, -1]"))
+    assert done.returncode == 1
+    words = "leap: block moved by 8 in one step, 8 times its size: it may have passed through what should hold it, "
+    assert words + "or nothing holds it; take a smaller 'step', or support it" in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(("old", "new", "carried"), [
