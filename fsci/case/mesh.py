@@ -34,7 +34,7 @@ class FileMesh(PlacedMesh):
     order: Order = setting(
         "auto",
         "polynomial order of the cells (.geo, and with 'thickness'; other files have theirs); auto: 2 for an elastic "
-        "body, but 1 where it may touch in a flow or, if it is not slender, with friction or in space, or where a "
+        "body, but 1 for one that is not slender where it may touch with friction, in a flow or in space, or where a "
         "support moves it in a flow",
     )
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")

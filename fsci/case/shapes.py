@@ -78,8 +78,8 @@ class ShapeSection(PlacedMesh):
     takes: ClassVar[Mapping[str, Takes]]
     order: Order = setting(
         "auto",
-        "polynomial order of the cells; auto: 2 for an elastic body, but 1 where it may touch in a flow or, if it is "
-        "not slender, with friction or in space, or where a support moves it in a flow",
+        "polynomial order of the cells; auto: 2 for an elastic body, but 1 for one that is not slender where it may "
+        "touch with friction, in a flow or in space, or where a support moves it in a flow",
     )
     if TYPE_CHECKING:
         shape: str

@@ -1,4 +1,4 @@
-"""The order of the cells of elastic bodies: 2, but for some that touch."""
+"""The order of the cells of elastic bodies: 2, but for thick ones where contact is fragile."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def chooses_order(mesh: Mesh) -> bool:
 def with_order(case: Case, name: str, *, slender: bool = False, fitted: bool = False) -> Mesh:
     """The settings of the mesh of an elastic body, with the order of its cells if the program chooses it.
 
-    For the same time second order has the smaller error, in thick bodies, too (docs/benchmarks.md). Where flows leave
-    a gap the films of `q1q1` are as coarse as cells of first order. With friction, nodes at the edge of a quadratic
-    surface may stick and slip in turn (`ironing`), and in space a ball that presses a part of one facet may find no
-    equilibrium: only slender bodies, wrong with first order, are worth it. What a support draws off a wall in a flow
+    For the same time second order has the smaller error, in thick bodies, too (docs/benchmarks.md). Slender ones are
+    wrong with first order: nothing is worth it. Where flows leave a gap the films of `q1q1` are as coarse as cells of
+    first order. With friction, nodes at the edge of a quadratic surface may stick and slip in turn (`ironing`), and in
+    space a ball that presses a part of one facet may find no equilibrium. What a support draws off a wall in a flow
     has the suction of the new film, in the cell at its end, too: there elements of second order invert. Where bodies
     are fitted into each other all around, contact has no edge, and straight facets would decide about its pressure.
     """
@@ -36,9 +36,8 @@ def with_order(case: Case, name: str, *, slender: bool = False, fitted: bool = F
     if not chooses_order(mesh):
         return mesh
     rubs = touches(case, name, with_friction=case.dimension == 2) and not fitted
-    fragile = rubs or _is_drawn(case, name)
-    first = name in bodies_that_may_touch(case) or (fragile and not slender)
-    return mesh.model_copy(update={"order": 1 if first else 2})
+    fragile = rubs or _is_drawn(case, name) or name in bodies_that_may_touch(case)
+    return mesh.model_copy(update={"order": 1 if fragile and not slender else 2})
 
 
 def touches(case: Case, name: str, *, with_friction: bool) -> bool:

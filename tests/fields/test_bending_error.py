@@ -248,19 +248,20 @@ FLOW = """{density: 1, viscosity: 1, scheme: bdf2, grid: {from: [0, -1], to: [3,
  patches: {walls: {on: [x-, y-, y+], no_slip: true}, out: {on: x+, outflow: true}}}"""
 
 
-def test_order_in_a_flow(tmp_path):
-    """Bodies that are held have second order, as without a flow; those that may touch something first."""
+@pytest.mark.parametrize(("height", "touching"), [(0.1, "quad9"), (1, "quad")])
+def test_order_in_a_flow(tmp_path, height, touching):
+    """Slender bodies have second order, as without a flow; thick ones that may touch something first."""
     more = "structure.dynamics={}", "structure.bodies.beam.material.density=1", "coupling={}", "kinematics=finite"
-    case = load(tmp_path, f"fluid={FLOW}", *more)
-    assert read_body(case, "beam").cell_type == "quad9"
-    assert choose_element(case, "beam", read_body(case, "beam")).warnings == ()
-    touching = load(tmp_path, f"fluid={FLOW}", *more, "contact={bodies: all}")
-    body = read_body(touching, "beam")
-    assert body.cell_type == "quad"
-    assert choose_element(touching, "beam", body).warnings != ()
-    free = load(tmp_path, f"fluid={FLOW}", *more, "supports=[]")
-    assert read_body(free, "beam").cell_type == "quad"
-    alone = load(tmp_path, f"fluid={FLOW}", *more, "supports=[]", "contact=none")
+    scene = f"fluid={FLOW}", *more, f"mesh.size=[1, {height}]"
+    held = load(tmp_path, *scene)
+    assert read_body(held, "beam").cell_type == "quad9"
+    assert choose_element(held, "beam", read_body(held, "beam")).warnings == ()
+    for changes in (("contact={bodies: all}",), ("supports=[]",)):
+        case = load(tmp_path, *scene, *changes)
+        body = read_body(case, "beam")
+        assert body.cell_type == touching
+        assert choose_element(case, "beam", body).warnings == ()
+    alone = load(tmp_path, *scene, "supports=[]", "contact=none")
     assert read_body(alone, "beam").cell_type == "quad9"
 
 
