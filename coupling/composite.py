@@ -7,7 +7,7 @@ the last process owns them. Bodies with a given motion have no unknowns, and are
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from coupling.ports import Solid
 from coupling.rigid_springs import RigidSprings
 from solvers.algebra.added_product import with_product
 from solvers.algebra.blocks import block_diagonal
+from solvers.algebra.connected import connected_parts
 from solvers.algebra.lagged import LaggedFactors
 from solvers.algebra.linear import LinearSolveFailed
 from solvers.algebra.rows import RowTransformation, TakenRows, gather, transform_rows
@@ -44,6 +45,7 @@ class Composite:
         self.size = elastic.size + rigid.size
         self.surfaces = elastic.surfaces | rigid.surfaces
         self._vertices = sum(len(points) for points in elastic.surfaces.values())
+        self._pieces = elastic.structure.pieces.count  # of the elastic bodies
         self._springs = RigidSprings(elastic.structure, rigid)
         self._known: Constraint | None = None  #: the constraint that `_masters` belongs to
         self._masters: FreeMasters | None = None
@@ -211,15 +213,27 @@ class Composite:
         parts = zip(self.parts, self._of_parts(increment), strict=True)
         return np.concatenate([part.update(own) for part, own in parts])
 
-    def retreat(self, fraction: float) -> None:
-        for part in self.parts:
-            part.retreat(fraction)
+    def retreat(self, fraction: Array) -> None:
+        self.elastic.retreat(fraction[: self._pieces])
+        self.rigid.retreat(fraction[self._pieces :])
 
-    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
-        first = len(self._residuals[0]) if risen else 0
-        return self.elastic.astray([rise[:first] for rise in risen]) or self.rigid.astray(
-            [rise[first:] for rise in risen]
-        )
+    def linked(self) -> Indices:
+        own = np.concatenate([self.elastic.linked(), self._pieces + self.rigid.linked()])
+        masters = self._find_masters()
+        between = [*self._springs.linked(), *([] if masters is None else masters.linked(self.elastic.structure))]
+        piece, body = np.array(between, dtype=np.int64).reshape(-1, 2).T
+        first, second = np.append(np.arange(len(own)), piece), np.append(own, self._pieces + body)
+        return connected_parts(first, second, len(own))
+
+    def parts_of(self, names: Collection[str]) -> NDArray[np.bool_]:
+        return np.concatenate([part.parts_of(names) for part in self.parts])
+
+    def cycle(self) -> str:
+        return self.elastic.cycle()
+
+    def astray(self, risen: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        elastic = self.elastic.astray([rise[: self._pieces] for rise in risen])
+        return np.concatenate([elastic, self.rigid.astray([rise[self._pieces :] for rise in risen])])
 
     def settled(self) -> bool:
         found = [part.settled() for part in self.parts]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -217,10 +217,20 @@ class Elastic:
     def update(self, increment: Array) -> Array:
         return self.structure.update(increment)
 
-    def retreat(self, fraction: float) -> None:
+    def retreat(self, fraction: Array) -> None:
         self.structure.retreat(fraction)
 
-    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
+    def linked(self) -> Indices:
+        return self.structure.linked()
+
+    def parts_of(self, names: Collection[str]) -> NDArray[np.bool_]:
+        own = np.concatenate([np.full(body.size, float(body.name in names)) for body in self.structure.bodies])
+        return self.structure.pieces.norms([own])[0] > 0.0
+
+    def cycle(self) -> str:
+        return self.structure.cycle()
+
+    def astray(self, risen: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
         return self.structure.astray(risen)
 
     def settled(self) -> bool:

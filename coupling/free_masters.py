@@ -22,6 +22,7 @@ from solvers.api import Array
 from solvers.contact.contact import Contact
 from solvers.rigid import surface
 from solvers.rigid.field import RigidBodies
+from solvers.structure.field import Structure
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,13 @@ class FreeMasters:
             return
         force = self.contact.force()
         self.bodies.press([(master.body, master.points, force[master.nodes]) for master in self._masters], weight)
+
+    def linked(self, structure: Structure) -> list[tuple[int, int]]:
+        """(elastic piece, body) of those that are opposite each other, each several times (collective)."""
+        slave, master = self.contact.linked()
+        piece = structure.at_constraint(structure.pieces.of_dofs.astype(float))[slave, 0].astype(np.int64)
+        pieces = [(one.body, piece[np.isin(master, one.nodes)]) for one in self._masters]
+        return [(number, body) for body, numbers in pieces for number in np.unique(numbers).tolist()]
 
     def jacobian(self) -> Sparse:
         """T, shape (n, n + unknowns of all bodies): columns of the nodes of free bodies are empty."""

@@ -32,12 +32,13 @@ from coupling.secant import Secant
 from coupling.start import start_again, start_together
 from coupling.wall_passed import WallPassed
 from solvers.algebra import linear
+from solvers.algebra.connected import connected_parts
 from solvers.algebra.lagged import Lagged, LaggedFactors
 from solvers.algebra.petsc_python import free_deleted
 from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import Numbering, distributed, from_entries, gather
 from solvers.algebra.sparse import Sparse
-from solvers.api import Array, FailureKind, NoResidual, State, StepFailed, StepInfo
+from solvers.api import Array, FailureKind, Indices, NoResidual, State, StepFailed, StepInfo
 from solvers.newton import ENOUGH, Tolerance, converge
 
 
@@ -180,7 +181,7 @@ class Monolithic:
             self.follow()
             now, before = (np.array([np.linalg.norm(r[:-1]), r[-1]]) for r in (self.residual(), unmoved))
             if not (now < before).all():
-                self.retreat(1.0)
+                self.retreat(np.ones(len(unmoved)))
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -205,7 +206,7 @@ class Monolithic:
         solid.load(force)
         self._on_surfaces = float(np.linalg.norm(force))
         self._residual = np.concatenate([solid.residual(), of_flow])
-        if self.comm.allreduce(bool(solid.astray()), op=MPI.LOR):
+        if self.comm.allreduce(bool(solid.cycle()), op=MPI.LOR):
             self._pull = max(self._pull, suction(self.coupled))
         return self._residual
 
@@ -330,15 +331,27 @@ class Monolithic:
         rows, columns = parts.row_numbers().astype(np.int64), parts.indices.astype(np.int64)
         return from_entries(self.comm, owned, rows, columns, parts.data)
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment."""
-        self.coupled.solid.retreat(fraction)
-        self.coupled.flow.retreat(fraction)
-        self._secant.retreat(fraction)
+    def retreat(self, fraction: Array) -> None:
+        """Take back fractions of the last increment, by part."""
+        self.coupled.solid.retreat(fraction[:-1])
+        self.coupled.flow.retreat(fraction[-1:])
+        self._secant.retreat(float(fraction[-1]))
 
-    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
-        """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""
-        return self.coupled.solid.astray()
+    def linked(self) -> Indices:
+        """Components: the flow and the bodies in it are one."""
+        solid, flow, interface = self.coupled.solid, self.coupled.flow, self.coupled.interface
+        of_solid, outside = solid.linked(), flow.outside(interface.move(interface.displacement()))
+        wet, n = np.flatnonzero(~solid.parts_of(outside)), len(of_solid)
+        first, second = np.append(np.arange(n), wet), np.append(of_solid, np.full(len(wet), n))
+        return connected_parts(first, second, n + 1)
+
+    def cycle(self) -> str:
+        """What cycles in contact."""
+        return self.coupled.solid.cycle()
+
+    def astray(self, risen: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        """The parts of an active set that cycles. Residuals of solid and flow may well rise."""
+        return np.append(self.coupled.solid.astray([]), False)
 
     def settled(self) -> bool:
         """Whether supports and active sets are fulfilled."""

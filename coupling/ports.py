@@ -104,6 +104,10 @@ class Solid(Part, Protocol):
         """Set the predictor for the time t [s]; `retreat` takes it back."""
         ...
 
+    def parts_of(self, names: Collection[str]) -> NDArray[np.bool_]:
+        """Mask of the parts of Newton's method that belong to these bodies (collective)."""
+        ...
+
     def in_contact(self) -> bool:
         """Whether any contact is closed, the same on every process."""
         ...

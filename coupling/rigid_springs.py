@@ -58,6 +58,12 @@ class RigidSprings:
         """Whether there are any."""
         return bool(self._joints)
 
+    def linked(self) -> list[tuple[int, int]]:
+        """(elastic piece, rigid body) of each (collective)."""
+        structure, springs = self._structure, self._structure.springs
+        pieces = [springs.number(structure, structure.pieces.of_dofs, j.spring, j.side) for j in self._joints]
+        return [(int(piece[0]), joint.body) for piece, joint in zip(pieces, self._joints, strict=True)]
+
     def follow(self) -> None:
         """Let the forces on rigid bodies belong to the present motion of the elastic ones (collective)."""
         if self._joints:

@@ -36,6 +36,14 @@ class Constraint(Stateful, Protocol):
         """What cycles, for messages: an active set that has come back to an earlier one of this step; else empty."""
         ...
 
+    def cycling(self) -> NDArray[np.bool_]:
+        """Mask of the nodes whose conditions cycle, shape (N,)."""
+        ...
+
+    def linked(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Pairs of nodes that conditions are between at the latest `evaluate`: numbers of either side."""
+        ...
+
     #: mask of the groups of conditions, as contact pairs, whose surfaces have no mass in dynamics
     present: NDArray[np.bool_]
 
@@ -111,8 +119,8 @@ class Constraint(Stateful, Protocol):
         """Compute the multipliers from the linearised balance [N] and the increment [m] at the dofs, (N * dim,)."""
         ...
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment of the multipliers."""
+    def retreat(self, fraction: Array) -> None:
+        """Take back fractions of the last increment of the multipliers, by node, shape (N,)."""
         ...
 
     def active(self) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, FailureKind, NoResidual, StepFailed, StepInfo
+from solvers.api import Array, FailureKind, Indices, NoResidual, StepFailed, StepInfo
 from solvers.counted import counted
 
 Flags = NDArray[np.bool_]
@@ -50,8 +50,15 @@ class System(Protocol):
         """
         ...
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment."""
+    def retreat(self, fraction: Array) -> None:
+        """Take back fractions of the last increment, by part."""
+        ...
+
+    def linked(self) -> Indices:
+        """The component of each part, by the number of its first part: parts that act on each other are in one.
+
+        Components are solved as if each were alone.
+        """
         ...
 
     def only_rounding(self) -> Flags:
@@ -62,16 +69,33 @@ class System(Protocol):
         """Whether the iterate fulfils supports, and its active set has not changed."""
         ...
 
-    def astray(self, risen: Sequence[Flags] = ()) -> str:
-        """Why whole increments may not converge, such as an active set that cycles; empty if they may.
+    def cycle(self) -> str:
+        """What cycles, such as an active set, for messages; empty if nothing does."""
+        ...
 
-        risen: the parts whose residual rose above all earlier ones of this solution, each time that one did.
+    def astray(self, risen: Sequence[Flags]) -> Flags:
+        """The parts whose whole increments may not converge, such as those of an active set that cycles.
+
+        risen: the parts in components whose residual rose above all earlier ones, each time that one did.
         """
         ...
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the largest residual, for messages."""
         ...
+
+
+class Smooth(System, Protocol):
+    """A system without an active set."""
+
+    def settled(self) -> bool:
+        return True
+
+    def cycle(self) -> str:
+        return ""
+
+    def astray(self, risen: Sequence[Flags]) -> Flags:
+        return np.zeros(len(self.linked()), dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -121,9 +145,12 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         rise = (residual > largest) & (residual > small)
         if rise.any():  # noise of parts that are solved must not hold up others
             rise &= ~system.only_rounding()
-        risen += [mask for mask in (rise, infinite, infinite) if mask.any()]
-        if (tolerance.line_search and settled) or (number > 0 and system.astray(risen)):
-            increment, residual = _halve(system, before, small, increment, residual)
+        risen += [in_components(mask, system.linked()) for mask in (rise, infinite, infinite) if mask.any()]
+        searched = np.full(len(residual), tolerance.line_search and settled)
+        if number > 0:
+            searched |= system.astray(risen)
+        if searched.any():
+            increment, residual = _halve(system, searched, before, small, increment, residual)
         ratio = residual / np.maximum(before, ZERO_RESIDUAL)
         largest, number = np.fmax(largest, residual), number + 1
 
@@ -137,6 +164,11 @@ def _residual(system: System) -> Array:
 #: Reduction of the residual of a linear system that is enough while nothing is known of the convergence. Measured with
 #: Hertz contact: 1e-2 takes as long, and another iterate on two of three meshes; 1e-4 takes 1.2 times as long.
 ENOUGH = 1e-3
+
+
+def in_components(parts: Flags, component: Indices) -> Flags:
+    """Mask of all parts that are in a component with one of the given ones."""
+    return np.isin(component, component[parts])
 
 
 def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
@@ -156,29 +188,38 @@ def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
 HALVINGS_OF_INCREMENT = 14
 
 
-def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
-    """Line search: halve the increment until the residual decreases, or take the best of the fractions tried.
+def _halve(
+    system: System, searched: Flags, before: Array, small: Array, increment: Array, residual: Array
+) -> tuple[Array, Array]:
+    """Line search: halve increments until the residual decreases, or take the best of the fractions tried.
 
-    Parts whose residual is small or rounding errors do not count. The residual has kinks, from which it may increase in
-    all directions; the way on is then that of the least increase.
+    Each component has its own fraction; those without any part in `searched` keep their whole increment. Parts whose
+    residual is small or rounding errors do not count. The residual has kinks, from which it may increase in all
+    directions; the way on is then that of the least increase.
     """
+    counts, component = ~system.only_rounding(), system.linked()
 
-    counts = ~system.only_rounding()
+    def size(of: Array) -> Array:
+        """Of the component of each part."""
+        large = np.where(np.isnan(of), math.inf, np.where(counts & (of > small), of, 0.0))
+        with np.errstate(over="ignore"):  # an iterate that has blown up
+            return np.sqrt(np.bincount(component, large**2, len(of)))[component]
 
-    def size(of: Array) -> float:
-        return math.inf if np.isnan(of).any() else float(np.linalg.norm(np.where(counts & (of > small), of, 0.0)))
+    def retreat(to: Array) -> Array:
+        """The residual with other fractions of the increments."""
+        system.retreat(fraction - to)
+        return _residual(system)
 
-    remaining, tried, enough_below = 1.0, [size(residual)], size(before)
-    while 0.0 < tried[-1] and not tried[-1] < enough_below and len(tried) <= HALVINGS_OF_INCREMENT:
-        system.retreat(0.5 * remaining)
-        remaining *= 0.5
-        residual = _residual(system)
+    fraction, tried, enough_below = np.ones(len(before)), [size(residual)], size(before)
+    halved = in_components(searched, component)
+    while (halved := halved & (tried[-1] > 0.0) & ~(tried[-1] < enough_below)).any():
+        if len(tried) > HALVINGS_OF_INCREMENT:
+            best = np.where(halved, 0.5 ** np.argmin(tried, axis=0), fraction)
+            return increment * best, retreat(best)
+        smaller = np.where(halved, 0.5 * fraction, fraction)
+        residual, fraction = retreat(smaller), smaller
         tried.append(size(residual))
-    if 0.0 < tried[-1] and not tried[-1] < enough_below:
-        best = 0.5 ** int(np.argmin(tried))
-        system.retreat(remaining - best)
-        remaining, residual = best, _residual(system)
-    return increment * remaining, residual
+    return increment * fraction, residual
 
 
 def converge(system: System, tolerance: Tolerance) -> StepInfo:
@@ -214,7 +255,7 @@ def _converge(system: System, tolerance: Tolerance, history: list[Array]) -> Ste
         size = _norms(history, open_parts)[-1]
         reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
         kind, norms = FailureKind.NEWTON, _norms(history, open_parts)
-        if cycle := system.astray():
+        if cycle := system.cycle():
             kind, reason = FailureKind.ACTIVE_SET, f"{reason}: {cycle}"
         raise StepFailed(system.name, kind, reason, iteration=iterate.number, where=system.worst(), history=norms)
     raise AssertionError("unreachable: iterates() has no end")

@@ -23,6 +23,7 @@ from solvers.contact.law.friction import FrictionBound, reversing
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
+from solvers.contact.no_gap import NoGap
 from solvers.contact.pair import Pair
 from solvers.contact.reach import Reach
 from solvers.contact.redistribute import redistributed
@@ -32,13 +33,6 @@ from solvers.contact.terms import Terms
 from solvers.contact.unheld import nearest_gaps, slips_freely, untouched
 from solvers.contact.violation import rounding, violation
 from solvers.contact.work import FrictionWork, GivenWork, along_surface
-
-#: Gap that is the rounding of positions, relative to the extent of all surfaces, and to their distance from the origin.
-GAP_OF_EXTENT, GAP_OF_DISTANCE = 1e-12, 1e-15
-
-#: The same of nodes that no iterate of this solve has pressed yet: rounding of meshes and their translations. They are
-#: tried. As those that would pull are open in the next iterate, the result does not depend on it.
-GAP_OF_TRIED = 1e-10
 
 
 class Contact:
@@ -87,10 +81,8 @@ class Contact:
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
         self.stiffness_per_area = np.zeros(count)  #: [Pa/m], at the latest evaluation
         self._stiffnesses = ContactStiffness(self.interface, np.zeros_like(self.x))
-        extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
-        self._touching = max(GAP_OF_EXTENT * extent, GAP_OF_DISTANCE * far)  # gaps [m]
-        self._nearly = GAP_OF_TRIED * max(extent, far)
-        self._tolerance = np.full(count, self._nearly)  # gap that counts as closed, at the latest evaluation [m]
+        self._no_gap = NoGap.among(self.nodes.points)
+        self._tolerance = np.full(count, self._no_gap.others)  # gap that counts as closed, at the latest evaluation [m]
         self._unheld = tuple(unheld)
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
@@ -171,9 +163,7 @@ class Contact:
 
     def _normal_forces(self) -> Array:
         """Integral of the pressure of each pair [N], shape (pairs,)."""
-        if self.terms is None:
-            return np.zeros(len(self.pairs))
-        return self.terms.D_of_pair @ np.einsum("nd,nd->n", self.z, self.terms.normals)
+        return np.zeros(len(self.pairs)) if self.terms is None else self.terms.normal_forces(self.z)
 
     def _force_and_slip(self) -> tuple[Array, Array]:
         """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
@@ -207,7 +197,7 @@ class Contact:
         if self.terms is not None:
             self._D = self._redistributed(self.terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
-            self._tolerance = np.where(self.active_set.tried, self._touching, self._nearly)
+            self._tolerance = self._no_gap.at(self.active_set.tried)
             if self._unheld and self.active_set.first:
                 areas = self.terms.D_of_pair * self._covers
                 self._tolerance += nearest_gaps(self._unheld, areas, self._mean_gap, self.active_set.active)
@@ -278,9 +268,8 @@ class Contact:
 
     def force(self) -> Array:
         """Contact force [N] on all nodes for the present multipliers, shape (N, dim)."""
-        if self.terms is None:
-            return np.zeros((self.size, self.dim))
-        return nodal_force(self.interface, self.terms, self.z)
+        none = np.zeros((self.size, self.dim))
+        return none if self.terms is None else nodal_force(self.interface, self.terms, self.z)
 
     def violation(self, weight: float) -> Array:
         """Norm [N] of the residual of the laws of multipliers in contact, by node, shape (N,)."""
@@ -358,9 +347,9 @@ class Contact:
         self._own = own
         self._set_multipliers(own)
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment of the multipliers."""
-        self._own = self._own - fraction * self._increment
+    def retreat(self, fraction: Array) -> None:
+        """Take back fractions of the last increment of the multipliers, by node, shape (N,)."""
+        self._own = self._own - fraction[self.multipliers.node, None] * self._increment
         self._set_multipliers(self._own)
 
     def dofs(self) -> NDArray[np.int64]:
@@ -370,15 +359,12 @@ class Contact:
     def touching_dofs(self) -> NDArray[np.int64]:
         """Global dofs of the nodes of surfaces of present pairs that are not tied, each once."""
         pairs = [pair for pair, present in zip(self.pairs, self.present, strict=True) if present and pair.law != Tied()]
-        numbers = [self.interface.nodes_of(side) for pair in pairs for side in (pair.slave, pair.master)]
-        dofs = self.nodes.dofs[np.unique(np.concatenate(numbers))] if numbers else np.empty(0, dtype=np.int64)
+        dofs = self.nodes.dofs[self.interface.mask([side for pair in pairs for side in (pair.slave, pair.master)])]
         return dofs[dofs >= 0]
 
     def multiplier_dofs(self) -> NDArray[np.int64]:
         """Global dofs of slave nodes of present pairs that are not tied."""
-        near = np.zeros(self.size, dtype=bool)
-        for pair, present in zip(self.pairs, self.present, strict=True):
-            near[self.interface.nodes_of(pair.slave)] |= present
+        near = self.interface.mask([pair.slave for pair, here in zip(self.pairs, self.present, strict=True) if here])
         slaves = (self.multipliers.areas > 0.0) & ~self._tied & near[self.multipliers.node]
         return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
 
@@ -426,6 +412,15 @@ class Contact:
     def cycle(self) -> str:
         """What cycles, for messages; empty if no earlier active set has come back."""
         return self.active_set.cycle()
+
+    def cycling(self) -> NDArray[np.bool_]:
+        """Mask of the nodes whose status changed when an earlier active set came back, shape (N,)."""
+        return np.bincount(self.multipliers.node[self.active_set.returned], minlength=self.size) > 0
+
+    def linked(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Slave and master nodes that are opposite each other."""
+        M = nothing((len(self.z), self.size)) if self.terms is None else self.terms.M
+        return self.multipliers.node[M.row_numbers()], M.indices.astype(np.int64)
 
     # ------------------------------------------------------------------------------------------- results and state
 

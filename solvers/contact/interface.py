@@ -51,6 +51,13 @@ class ContactInterface:
         """Numbers of the nodes of a surface among all nodes."""
         return self.nodes.of_surface[_index(self.surfaces, surface)]
 
+    def mask(self, surfaces: Sequence[Surface]) -> NDArray[np.bool_]:
+        """Mask of the nodes of some surfaces, shape (N,)."""
+        found = np.zeros(len(self.nodes.points), dtype=bool)
+        for surface in surfaces:
+            found[self.nodes_of(surface)] = True
+        return found
+
     def unmoved(self) -> Array:
         """Positions [m] of all nodes as meshed, before those of tied surfaces were relocated, shape (N, dim)."""
         x = self.nodes.points.copy()

@@ -42,6 +42,10 @@ class Terms:
     dforce: Sparse  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
     dnormals: Sparse  #: shape (dim * C, dim * N)
 
+    def normal_forces(self, z: Array) -> Array:
+        """Integral of the pressure of each pair [N], shape (pairs,); z: multipliers [Pa], shape (C, dim)."""
+        return self.D_of_pair @ np.einsum("nd,nd->n", z, self.normals)
+
 
 def find_normals(multipliers: Multipliers, x: Array, near: Sequence[NDArray[np.bool_] | None] | None = None) -> Normals:
     """Normals of all patches at positions x [m] of all nodes, shape (N, dim).

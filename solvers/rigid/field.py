@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +10,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.algebra.connected import connected_parts
 from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import RowTransformation, TakenRows
 from solvers.algebra.sparse import Sparse, block_diagonal
 from solvers.algebra.vertices import VertexJacobian
 from solvers.api import Array, Indices, State, Step, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
-from solvers.newton import Tolerance, converge
+from solvers.newton import Smooth, Tolerance, converge
 from solvers.rigid import line_springs, motion, surface
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.contact import RigidContact
@@ -33,7 +34,7 @@ from solvers.timing import Timer
 UNKNOWNS = {2: np.array([0, 1, 5]), 3: np.arange(6)}
 
 
-class RigidBodies:
+class RigidBodies(Smooth):
     """Implements `Solid`. Every process has all bodies; one owns the unknowns, the first unless they are `behind`.
 
     The unknowns of a body are its increments in a step: displacement of the centre [m] and rotation vector in space
@@ -178,7 +179,7 @@ class RigidBodies:
         if self.contact is None or self.static or not self.contact.active.any():
             return
         inertia = np.array([motion.mass(body, now.R) for body, now in zip(self.bodies, self.now, strict=True)])
-        mass = block_diagonal(self._without_held(inertia[:, self.components][:, :, self.components]))
+        mass = block_diagonal(motion.without_held(inertia[:, self.components][:, :, self.components], self._free))
         before, weight, w = self._velocity(self.old), self.force_weight, self._pressed_weight
         force, force_before = (
             self._by_component(np.array([one.load for one in some]) + by_flow)
@@ -357,23 +358,17 @@ class RigidBodies:
         right = -self.balance if self.contact is None else self.contact.force - self.balance
         with supported():
             if self.contact is None and not self.springs:
-                blocks = self._without_held(self._blocks())
+                blocks = motion.without_held(self._blocks(), self._free)
                 return self._add(np.linalg.solve(blocks, right.reshape(*blocks.shape[:2], 1)).ravel())
             return self._add(solver(self._system() if self.contact is None else self.contact.tangent)(right))
 
     def _system(self) -> Sparse:
         """The tangent with rows and columns of the identity for held components."""
-        return self._turning(self._without_held(self._blocks()), self._free)
+        return self._turning(motion.without_held(self._blocks(), self._free), self._free)
 
     def _upright(self) -> Sparse:
         """The same where forces of the flow and of contact do not turn."""
-        return self._with_springs(self._without_held(self._upright_blocks()), self._free)
-
-    def _without_held(self, blocks: Array) -> Array:
-        """Blocks of bodies with rows and columns of the identity for held components."""
-        free = self._free.reshape(blocks.shape[:2])
-        kept = np.where(free[:, :, None] & free[:, None, :], blocks, 0.0)
-        return kept + np.where(free, 0.0, 1.0)[:, :, None] * np.eye(free.shape[1])
+        return self._with_springs(motion.without_held(self._upright_blocks(), self._free), self._free)
 
     def right_side(self) -> Array:
         """Minus the balance, without the contact forces at the end of the step."""
@@ -401,17 +396,18 @@ class RigidBodies:
         change, size = (np.linalg.norm(scale * u, axis=1) for u in (added, self._u))
         return np.divide(change, size, out=np.zeros_like(size), where=size > 0.0)
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment."""
-        self.set_increments(self._u - fraction * self._last)
+    def parts_of(self, names: Collection[str]) -> NDArray[np.bool_]:
+        return np.array([body.name in names for body in self.bodies])
 
-    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
-        """Empty: the contact of rigid bodies has no active set."""
-        return ""
+    def retreat(self, fraction: Array) -> None:
+        """Take back fractions of the last increment, by body."""
+        self.set_increments(self._u - fraction[:, None] * self._last)
 
-    def settled(self) -> bool:
-        """True: the residual includes the contact conditions."""
-        return True
+    def linked(self) -> Indices:
+        """For each body, the smallest number of those that are near each other or joined by springs."""
+        joined = line_springs.joined(self.springs)
+        both = joined if self.contact is None else np.concatenate([joined, self.contact.near.both()])
+        return connected_parts(both[:, 0], both[:, 1], len(self.bodies))
 
     def rounded(self) -> Array:
         """Magnitudes that are rounded: displacement plus size for positions [m], one for rotations."""

@@ -50,6 +50,12 @@ class _End:
     turning: Array  #: angular velocity of its body [rad/s], shape (3,)
 
 
+def joined(springs: Sequence[LineSpring]) -> NDArray[np.int64]:
+    """Pairs of bodies that springs join, shape (n, 2)."""
+    found = [(spring.body, spring.other) for spring in springs if isinstance(spring.other, int)]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
 def with_springs(
     springs: Sequence[LineSpring], bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]
 ) -> list[RigidInstant]:

@@ -170,6 +170,13 @@ def own_tangent(
     return inertia_tangent(body, scheme, old, now, theta, dt) - (1.0 - scheme.alpha_f) * loads
 
 
+def without_held(blocks: Array, free: NDArray[np.bool_]) -> Array:
+    """Blocks of bodies with rows and columns of the identity for held unknowns; free: mask of all unknowns."""
+    free = free.reshape(blocks.shape[:2])
+    kept = np.where(free[:, :, None] & free[:, None, :], blocks, 0.0)
+    return kept + np.where(free, 0.0, 1.0)[:, :, None] * np.eye(free.shape[1])
+
+
 def own_tangents(
     bodies: Sequence[RigidBody],
     scheme: GeneralisedAlpha,

@@ -169,6 +169,10 @@ class Near:
         """What tells them apart, shape (m, 2)."""
         return np.stack([self.vertex, self.edge], axis=1)
 
+    def both(self) -> NDArray[np.int64]:
+        """Pairs of bodies that are near each other, each several times, shape (n, 2)."""
+        return self.body[(self.body >= 0).all(axis=1)]
+
     def arms(self, moment: Moment) -> Array:
         """Vectors from the centres of both bodies to the vertex and to its foot [m], shape (m, 2, 3)."""
         centres = np.array([moment.centre(index) for index in range(len(moment.bodies))])

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.algebra.connected import connected_parts
-from solvers.api import Array
+from solvers.api import Array, Indices
 from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Body
 
@@ -46,6 +46,12 @@ class BodyPieces:
     def _sum(self, values: NDArray) -> NDArray:
         """The sum over all processes."""
         return values if self._comm.size == 1 else self._comm.allreduce(values)
+
+    def linked(self, pairs: Sequence[tuple[Indices, Indices]]) -> Indices:
+        """For each piece, the smallest number of those that pairs of numbers lead to from it."""
+        none = np.empty(0, dtype=np.int64)
+        first, second = (np.concatenate([none, *(pair[side] for pair in pairs)]) for side in (0, 1))
+        return connected_parts(first, second, self.count)
 
     def below(self, array: Array, bound: Array) -> NDArray[np.bool_]:
         """Whether the vector at each owned node of a piece is at most as long as another one, by piece (collective).

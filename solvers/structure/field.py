@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -17,7 +17,7 @@ from solvers.algebra.blocks import Layout
 from solvers.algebra.largest import position_of_largest
 from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import RowTransformation, TakenRows, gather, transform_rows
-from solvers.api import Array, FailureKind, State, Step, StepFailed, StepInfo
+from solvers.api import Array, FailureKind, Indices, State, Step, StepFailed, StepInfo
 from solvers.constraint import Constraint
 from solvers.newton import converge
 from solvers.solver_settings import SolverSettings
@@ -87,6 +87,7 @@ class Structure:
         self._b, self._x = self.layout.vector(), self.layout.vector()
         self._extent = largest_extent(comm, bodies)  #: [m]
         self._first = self.now.u, 0.0  #: displacement [m] and time [s] at the start of the run
+        self._heights = np.concatenate([body.heights.repeat(self.dim) for body in bodies])  # of owned dofs [m]
         self.damping = time.create_damping(self)  #: of all bodies; None without damping
         self.solver = SolidSolver(self.comm, self.dim, self.dofs(), settings, contact=contact is not None)
 
@@ -316,10 +317,8 @@ class Structure:
         if self.damping is not None:
             self.now.damping = self.damping.force(self.now.v)
         self.residual_force = self.time.balance(self)
-        self._unbalanced, missed = self.held.free_part(self.residual_force), None
-        if self.constraint is not None and self._constrained is not None and self.constraint.near:
-            at_nodes = self.constraint.violation(self.time.force_weight)
-            missed = np.bincount(self._constrained.pieces, at_nodes**2, self.pieces.count).astype(float)
+        self._unbalanced = self.held.free_part(self.residual_force)
+        missed = None if self._constrained is None else self._constrained.missed(self.time.force_weight)
         return self.pieces.norms([self._unbalanced], missed)[0]
 
     def forces(self) -> Array:
@@ -403,10 +402,6 @@ class Structure:
         """Magnitudes whose rounding enters the balance, at owned dofs [m]: |u|, and h for that of I + grad u."""
         return np.abs(self.now.u) + self._heights
 
-    @cached_property
-    def _heights(self) -> Array:
-        return np.concatenate([body.heights.repeat(self.dim) for body in self.bodies])
-
     def missing_displacement(self) -> Array:
         """Prescribed minus present displacements at owned dofs [m], zero at free ones."""
         return self.target - self.held.part(self.now.u)
@@ -438,17 +433,25 @@ class Structure:
         change, size = self.pieces.norms([self.increment, self.now.u])
         return np.divide(change, size, out=np.zeros_like(size), where=size > 0.0)
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment."""
-        self.now.u -= fraction * self.increment
-        if self.constraint is not None:
-            self.constraint.retreat(fraction)
+    def retreat(self, fraction: Array) -> None:
+        """Take back fractions of the last increment, by piece."""
+        self.now.u -= fraction[self.pieces.of_dofs] * self.increment
+        if self._constrained is not None:
+            self._constrained.retreat(fraction)
 
-    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
-        """Why whole increments may not converge: an active set that cycles, or a residual that grows in contact."""
-        if self.constraint is None or self._constrained is None or not self.constraint.near:
-            return ""
-        return self.constraint.cycle() or ("the residual grows" if self._constrained.touched(risen) > 1 else "")
+    def linked(self) -> Indices:
+        """Numbers of pieces: the smallest of those that touch, are tied or joined by springs (collective)."""
+        touching = [] if self._constrained is None else [self._constrained.linked()]
+        return self.pieces.linked([*self.springs.linked(self, self.pieces.of_dofs), *touching])
+
+    def cycle(self) -> str:
+        """What cycles in contact."""
+        return "" if self._constrained is None else self._constrained.cycle()
+
+    def astray(self, risen: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        """The pieces of an active set that cycles, and those in contact whose residual rose twice."""
+        none = np.zeros(self.pieces.count, dtype=bool)
+        return none if self._constrained is None else self._constrained.astray(risen)
 
     def settled(self) -> bool:
         """Whether the prescribed displacements are reached and the active set has not changed (collective)."""
@@ -467,15 +470,12 @@ class Structure:
             self._tangent = self.linearise()
         assert self.rounding is not None
         found = self.pieces.below(self._unbalanced, self.rounding)
-        if self.constraint is None or self._constrained is None or not self.constraint.near:
+        if self._constrained is None or not self._constrained.near:
             return found
         if first and not found.any():  # the errors of contact would take as long as another iterate
             return found
-        weight, several = self.time.force_weight, 2.0**self.dim
-        of_force, of_conditions = self.constraint.rounding(weight)
-        found = self.pieces.below(self._unbalanced, self.rounding + several * self._constrained.at_owned(of_force))
-        missed = self.constraint.violation(weight) > several * of_conditions
-        return found & (np.bincount(self._constrained.pieces[missed], minlength=self.pieces.count) == 0)
+        of_force, fulfilled = self._constrained.rounding(self.time.force_weight, times=2.0**self.dim)
+        return fulfilled & self.pieces.below(self._unbalanced, self.rounding + of_force)
 
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the largest residual relative to the forces on its piece (collective)."""

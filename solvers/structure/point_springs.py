@@ -18,7 +18,7 @@ from solvers import fem
 from solvers.algebra.blocks import Layout
 from solvers.algebra.rows import distributed, gather_at, owned_rows
 from solvers.algebra.sparse import sparse_from_entries
-from solvers.api import Array
+from solvers.api import Array, Indices
 from solvers.spring_law import PointMotion, SpringLaw
 from solvers.structure.body import Body
 from solvers.structure.instant import MovingStructure
@@ -102,6 +102,19 @@ class PointSprings:
         )
         u, v = (np.pad(weights @ values, (0, 3 - dim)) for values in (u, v))
         return EndPlace(dofs, weights, at + u, v, rate)
+
+    def linked(self, structure: SprungStructure, numbers: Indices) -> list[tuple[Indices, Indices]]:
+        """Pairs of numbers of the bodies that springs join; numbers: at owned dofs (collective)."""
+        ends = [[self.number(structure, numbers, i, side) for side in (0, 1)] for i in range(len(self.springs))]
+        return [(one, other) for one, other in ends if len(one) and len(other)]
+
+    def number(self, structure: SprungStructure, numbers: Indices, spring: int, side: int) -> Indices:
+        """That of the body at an end, shape (1,), empty without one; numbers: at owned dofs (collective)."""
+        nodes = self._nodes[spring][side]
+        if nodes is None:
+            return np.empty(0, dtype=np.int64)
+        found = gather_at(structure.comm, numbers.astype(float), structure.layout.start, nodes[0][0, :1])
+        return found.astype(np.int64)
 
     def motion(self, structure: SprungStructure, spring: int, side: int) -> tuple[Array, Array]:
         """Position [m] and velocity [m/s] of an end, for other fields (collective)."""

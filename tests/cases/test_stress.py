@@ -259,6 +259,13 @@ def test_a_stack_beside_a_column_whose_residual_grows():
 
 
 @pytest.mark.slow
+def test_a_ring_that_closes_with_friction_beside_a_column():
+    """The residual of the column does not decide how far the steps of the ring are shortened."""
+    one = run.judge(440031)
+    assert (one.scene, one.twin[:6], one.verdict) == ("curl", "beside", "right")
+
+
+@pytest.mark.slow
 def test_a_ring_that_closes_with_friction_at_another_angle():
     """Which facets are near at the beginning of the step in which its ends meet depended on the angle to the axes."""
     one = run.judge(300158)

@@ -21,7 +21,7 @@ class Part:
         self.calls.append("predict")
 
     def retreat(self, fraction):
-        self.calls.append(fraction)
+        self.calls += fraction.tolist()
 
 
 @pytest.mark.parametrize("residual", [0.5, 2.0, float("nan")])
@@ -57,7 +57,7 @@ def test_predictors_are_taken_back_to_the_start_of_the_step():
     assert abs(coupled.flow.flow - before.flow).max() > 1e-3
     scheme.follow()
     scheme.residual()
-    scheme.retreat(1.0)
+    scheme.retreat(np.ones(2))
     assert coupled.solid.structure.now.u == pytest.approx(before.u, abs=1e-14)
     assert coupled.flow.flow == pytest.approx(before.flow, abs=1e-12)
 

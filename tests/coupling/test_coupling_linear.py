@@ -150,7 +150,7 @@ def test_an_increment_can_be_taken_back():
     before = coupled.flow.flow.copy(), coupled.solid.structure.now.u.copy()
     scheme.advance()
     moved = coupled.flow.flow.copy(), coupled.solid.structure.now.u.copy()
-    scheme.retreat(0.25)
+    scheme.retreat(np.full(len(scheme.forces()), 0.25))
     for start, end, now in zip(before, moved, (coupled.flow.flow, coupled.solid.structure.now.u), strict=True):
         assert np.abs(end - start).max() > 1e-6
         np.testing.assert_allclose(now, start + 0.75 * (end - start), atol=1e-12)

@@ -127,7 +127,7 @@ def test_taking_back_an_increment_gives_the_residual_before(tmp_path):
     scheme.residual()
     assert (active & ~flow.system.active_dofs).any()
     for fraction in (0.5, 0.25, 0.25):
-        scheme.retreat(fraction)
+        scheme.retreat(np.full(len(before), fraction))
         scheme.follow()
         after = scheme.residual()
     assert after == pytest.approx(before, rel=1e-4, abs=1e-6)

@@ -305,5 +305,5 @@ def test_an_increment_can_be_taken_back():
     before = bodies.displacement()
     bodies.update(np.array([0.1, 0.2, -0.3, 0.02, -0.01, 0.03]))
     assert np.abs(bodies.displacement() - before).min() > 0.01
-    bodies.retreat(1.0)
+    bodies.retreat(np.ones(len(bodies.bodies)))
     assert bodies.displacement() == pytest.approx(before, abs=1e-14)

@@ -62,7 +62,7 @@ def test_it_stops_at_the_ground(velocity, scale):
     stopped = 2.0 * free
     stopped[len(velocity) - 1] = -0.003 * scale
     assert bodies.increments()[0] == pytest.approx(stopped, abs=1e-9 * scale)
-    bodies.retreat(1.0)
+    bodies.retreat(np.ones(len(bodies.bodies)))
     assert bodies.increments()[0] == pytest.approx(np.zeros(6), abs=1e-15 * scale)
 
 

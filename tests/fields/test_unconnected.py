@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from programs import fsci
-from unconnected_scenes import Scene, case_of, computed, difference, dragged, draw_pair, tied
+from unconnected_scenes import Scene, case_of, computed, difference, dragged, draw_pair, on_a_corner, tied
 
 from fsci import shapes
 from fsci.running.history import read_history
@@ -27,6 +27,21 @@ def test_two_scenes_in_one_case(tmp_path, seed):
     for scene in scenes:
         alone = computed(tmp_path / scene.name, case_of([scene], dynamics=dynamics))
         assert difference(scene, alone, both) < AGREE
+
+
+@pytest.mark.parametrize("stiffness", [1.378, pytest.param(1e3, marks=pytest.mark.slow), 1e9])
+def test_line_searches_of_two_scenes(tmp_path, stiffness):
+    """Each shortens its own steps: together they take as many as the one that needs more."""
+    scenes = [Scene("a", [0.0, 0.0], 1e3), Scene("b", [7.0, 0.5], stiffness)]
+    for scene, edge, load in zip(
+        scenes, (-0.4841810627903052, -0.44798793688412153), (2.008e-4, 1.465e-4), strict=True
+    ):
+        on_a_corner(scene, edge, load)
+    both = computed(tmp_path / "both", case_of(scenes))
+    alone = [computed(tmp_path / scene.name, case_of([scene])) for scene in scenes]
+    for scene, history in zip(scenes, alone, strict=True):
+        assert difference(scene, history, both) < AGREE
+    assert both["iterations"] == pytest.approx(np.maximum(*(history["iterations"] for history in alone)))
 
 
 @pytest.mark.slow

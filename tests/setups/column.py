@@ -97,7 +97,10 @@ class Column:
         return np.array([np.linalg.norm(increment) / max(np.linalg.norm(self.unknowns), 1e-300)])
 
     def retreat(self, fraction):
-        self.unknowns = self.unknowns - fraction * self.last
+        self.unknowns = self.unknowns - fraction[0] * self.last
+
+    def linked(self):
+        return np.zeros(1, dtype=np.int64)
 
     def only_rounding(self):
         return self.residual() <= 8.0 * np.finfo(float).eps * self.forces()
@@ -108,8 +111,11 @@ class Column:
     def settled(self):
         return True
 
-    def astray(self, risen=()):
+    def cycle(self):
         return ""
+
+    def astray(self, risen):
+        return np.zeros(1, dtype=bool)
 
     def worst(self):
         return None

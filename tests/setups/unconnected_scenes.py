@@ -113,6 +113,16 @@ def tied(scene, rng):
     scene.reaction("lower", "bottom")
 
 
+def on_a_corner(scene, edge, load):
+    """A thin strip bends onto a corner; whole Newton steps overshoot it. load: pressure on it relative to E."""
+    scene.body(
+        "strip", scene.rectangle([2, 0.05], [40, 1], -1.0), supports=[held(["left", "right"])],
+        tractions=[{"on": "top", "value": [0, f"-{load * scene.E:.6e}*t"]}],
+    )  # fmt: skip
+    step = scene.obstacle("step", scene.rectangle([0.5, 0.5], [1, 1], edge - 0.5, -0.58), ["top", "right"])
+    scene.pair("step", ("strip", "bottom"), step)
+
+
 KINDS = (bent, blown, moved, pressed, dragged, stacked, tied)
 
 

@@ -38,16 +38,22 @@ class Scalar:
         self.increment = -self.f(self.x) / self.used
         self.x += self.increment
         self.solves += 1
-        return np.array([abs(self.increment / self.x)])
+        return np.array([abs(self.increment / self.x) if self.x else 0.0])
 
     def retreat(self, fraction):
-        self.x -= fraction * self.increment
+        self.x -= fraction[0] * self.increment
+
+    def linked(self):
+        return np.zeros(1, dtype=np.int64)
 
     def only_rounding(self):
         return self.residual() <= self._round_off
 
-    def astray(self, risen=()):
+    def cycle(self):
         return ""
+
+    def astray(self, risen):
+        return np.zeros(1, dtype=bool)
 
     def settled(self):
         return self.solves >= self.settled_after
@@ -197,8 +203,11 @@ class Together:
         return self._each(lambda system: system.advance(keep=keep, reduction=reduction))
 
     def retreat(self, fraction):
-        for system in self.systems:
-            system.retreat(fraction)
+        for system, own in zip(self.systems, fraction, strict=True):
+            system.retreat([own])
+
+    def linked(self):
+        return np.arange(len(self.systems))
 
     def only_rounding(self):
         return self._each(lambda system: system.only_rounding())
@@ -206,8 +215,11 @@ class Together:
     def settled(self):
         return all(system.settled() for system in self.systems)
 
-    def astray(self, risen=()):
+    def cycle(self):
         return ""
+
+    def astray(self, risen):
+        return np.zeros(len(self.systems), dtype=bool)
 
     def worst(self):
         return None
@@ -232,6 +244,17 @@ def test_a_soft_part_converges_beside_a_stiff_one(beside, line_search):
     assert system.x == pytest.approx(alone.x, abs=1e-10)
 
 
+def test_each_component_has_its_own_line_search():
+    """Newton's method diverges from 2 for the arctangent, and needs whole steps for the other one."""
+    alone = arctangent(), stiff()
+    found = [converge(system, Tolerance(1e-10, line_search=True)).iterations for system in alone]
+    together = arctangent(), stiff()
+    assert converge(Together(*together), Tolerance(1e-10, line_search=True)).iterations == max(found)
+    fewer = int(np.argmin(found))
+    assert together[1 - fewer].x == alone[1 - fewer].x
+    assert together[fewer].x == pytest.approx(alone[fewer].x, abs=1e-9)
+
+
 def test_residuals_of_rounding_are_not_reported():
     noise = Scalar(lambda x: 1.0, lambda x: 1e300, 1.0, round_off=2.0)
     info = converge(Together(noise, root_of_two()), Tolerance(1e-10))
@@ -250,9 +273,9 @@ def test_rounding_of_one_part_does_not_shorten_the_increments_of_another():
 class Watching(Together):
     """Keeps the parts whose residuals rose last."""
 
-    def astray(self, risen=()):
+    def astray(self, risen):
         self.risen = list(risen)
-        return ""
+        return super().astray(risen)
 
 
 @pytest.mark.parametrize(("round_off", "rises"), [(1e9, 0), (0.0, 4)])

@@ -18,7 +18,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers.api import Array, State, StepInfo
+from solvers.api import Array, Indices, State, StepInfo
 from solvers.fluid.cut.cut import Cut
 from solvers.fluid.flow import reach
 from solvers.fluid.flow.balances import Balances
@@ -44,12 +44,12 @@ from solvers.fluid.surfaces.surface import Motion
 from solvers.fluid.terms.boundary.patches import Patch, periodic_axes
 from solvers.fluid.terms.coupling_entries import InterfaceEntries
 from solvers.mesh.distributed import everywhere
-from solvers.newton import converge
+from solvers.newton import Smooth, converge
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
 
 
-class Fluid:
+class Fluid(Smooth):
     """Implements `Field`: velocity and pressure on the cut grid, from step to step."""
 
     name = "fluid"
@@ -415,17 +415,13 @@ class Fluid:
         change, solution = (self._norm(rows) for rows in self.iterate.add(increment))
         return np.array([change / solution if solution > 0.0 else 0.0])
 
-    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
-        """Empty: a flow has no active set."""
-        return ""
+    def retreat(self, fraction: Array) -> None:
+        """Take back a fraction of the last increment, shape (1,)."""
+        self.iterate.retreat(float(fraction[0]))
 
-    def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment."""
-        self.iterate.retreat(fraction)
-
-    def settled(self) -> bool:
-        """True: a flow has no active set that an iterate could change."""
-        return True
+    def linked(self) -> Indices:
+        """One part."""
+        return np.zeros(1, dtype=np.int64)
 
     def add_rounding(self, error: Array) -> None:
         """Add rounding errors at owned dofs that another field causes in these equations; call it after `linearise`."""
