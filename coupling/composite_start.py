@@ -52,6 +52,9 @@ class CompositeStart:
         with self._rigid.step(t, dt), self._elastic.step(t, dt):
             yield
 
+    def strike(self, dt: float) -> None:
+        """Both keep their schemes."""
+
     def repeat(self) -> None:
         self._rigid_bodies.now = list(self._first)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from coupling.balance import Balance, InterfaceSentinel
+from coupling.impact import Impacts
 from coupling.interface import DrySide, Interface
 from coupling.ports import Flow, Solid, Start
 from coupling.sealing_layer import SealingLayer
@@ -42,6 +43,7 @@ class Coupled:
         self.longest_first = math.inf  #: longest part [s] of the first step, in which the flow may brake free bodies
         self.interface = Interface(solid, flow.times, dry_sides, layers)
         self.balance = Balance(flow, solid, self.interface)
+        self.impacts = Impacts(solid, start)
         self.sentinel = InterfaceSentinel(self.balance, solid, steady=flow.steady)
 
     def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:
@@ -64,6 +66,7 @@ class Coupled:
         self._dt = dt
         if self.walls is not None:
             self.notes += self.walls.approach(dt)
+        self.impacts.begin_step()
         self.flow.begin_step(t, dt)
         self.interface.begin_step(self.flow.difference)
         self.solid.begin_step(t, dt)
@@ -77,9 +80,10 @@ class Coupled:
         self.solid.predict(t)
 
     def end_step(self) -> None:
-        """Accept the step. Raises WallPassed."""
+        """Accept the step. Raises WallPassed and Impact."""
         if self.walls is not None:
             self.walls.require_apart()
+        self.impacts.require_none()
         self.solid.end_step()
         self.flow.end_step()
         self.balance.add_step(self._dt)

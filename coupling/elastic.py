@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -27,6 +27,8 @@ from solvers.structure.saved import from_bodies, per_body
 #: solution more for each.
 HALVINGS_OF_LOAD = 2
 
+Impulse = Literal["none", "next two", "next", "last"]
+
 
 class Elastic:
     """Implements `Solid`. A vertex is a node of the structure, or on a facet between nodes, where a tie divides it."""
@@ -39,8 +41,8 @@ class Elastic:
         mixtures = [surface.mixture for surface in surfaces if surface.mixture is not None]
         self._mixture = stack(mixtures) if mixtures else None  #: vertices from the nodes; None: they are the same
         self.predictor = Predictor()
-        #: whether the next step takes the impulse of an impulsive start, by backward Euler, or the last one did
-        self.impulse: Literal["none", "next", "last"] = "none"
+        #: whether the next step takes an impulse by backward Euler, the one after it, too, or the last one did
+        self.impulse: Impulse = "none"
         self.name, self.comm, self.size = structure.name, structure.comm, structure.layout.size
         self._time = structure.time  #: the scheme of all other steps
 
@@ -61,7 +63,7 @@ class Elastic:
 
     def begin_step(self, t: float, dt: float) -> None:
         self.choose_scheme()
-        if self.impulse == "next":
+        if self.impulse.startswith("next"):
             self.structure.now.a[:] = 0.0  # Newmark's relations are those of backward Euler then
         before = self.structure.now.u.copy()  # surfaces that lose their mass move to their equilibrium, by a leap
         self.structure.begin_step(t, dt)
@@ -70,7 +72,7 @@ class Elastic:
     def choose_scheme(self) -> None:
         """Set the time scheme of the structure: its own one, or backward Euler."""
         self.structure.time = own = self._time
-        if self.impulse == "next" and isinstance(own, Dynamics):
+        if self.impulse.startswith("next") and isinstance(own, Dynamics):
             self.structure.time = replace(own, scheme=BACKWARD_EULER)
 
     def predict(self, t: float) -> None:
@@ -121,8 +123,8 @@ class Elastic:
 
     def end_step(self) -> None:
         self.structure.end_step()
-        if self.impulse == "next":
-            self.impulse = "last"
+        after: Mapping[str, Impulse] = {"next two": "next", "next": "last"}
+        self.impulse = after.get(self.impulse, self.impulse)
 
     # ---------------------------------------------------------------------------------------------- the surface
 

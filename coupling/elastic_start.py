@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from coupling.elastic import Elastic
 from solvers.api import Array
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.first_state import SmoothAcceleration
 
 #: n steps leave the share (1 + n x) / (1 + x)^n, x = (omega dt)^2, of a motion of frequency omega.
@@ -99,6 +100,18 @@ class ElasticStart:
     @property
     def took_impulse(self) -> bool:
         return self.elastic.impulse == "last"
+
+    def strike(self, dt: float) -> None:
+        """Take the impulse of an impact in the next two steps, of length dt [s], if damping ends all that it excites.
+
+        A body that arrives within a step takes the rest of its impulse in the second one.
+
+        A motion of the frequency w is overdamped if beta w > 2. So are all with w dt > 1, which steps do not resolve,
+        if beta > 2 dt. Other bodies keep their scheme, which conserves what an elastic rebound needs.
+        """
+        time = self._structure.time
+        if isinstance(time, Dynamics) and time.damping.stiffness > 2.0 * dt:
+            self.elastic.impulse = "next two"
 
     def repeat(self) -> None:
         """A further step starts where the last one ended."""

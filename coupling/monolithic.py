@@ -27,6 +27,7 @@ from petsc4py import PETSc
 from coupling.blocks import Blocks
 from coupling.coupled import Coupled, suction, with_cause
 from coupling.divided import lengths, step_in_parts
+from coupling.impact import Impact
 from coupling.ports import IterativeFlow
 from coupling.secant import Secant
 from coupling.start import start_again, start_together
@@ -133,6 +134,10 @@ class Monolithic:
             return self._take_from(t, dt, predicted=not self.coupled.flow.steady)
         except WallPassed:
             self.restore(before)
+            return self._take(t, dt)
+        except Impact:
+            self.restore(before)
+            self.coupled.impacts.start_anew(dt)
             return self._take(t, dt)
         except NoResidual:
             if self.coupled.flow.steady:

@@ -17,6 +17,7 @@ from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.bracket import CouplingIterate, brackets, halved
 from coupling.coupled import Coupled, suction, with_cause
 from coupling.divided import lengths, step_in_parts
+from coupling.impact import Impact
 from coupling.start import start_again, start_together
 from coupling.wall_passed import WallPassed
 from solvers.api import Array, FailureKind, State, StepFailed, StepInfo
@@ -66,11 +67,16 @@ class Partitioned:
 
     def _take(self, t: float, dt: float) -> StepInfo:
         walls = self.coupled.walls
-        before = self.save() if walls is not None and walls.waiting else {}
+        waits = (walls is not None and walls.waiting) or self.coupled.impacts.possible
+        before = self.save() if waits else {}
         try:
             return self._take_once(t, dt)
         except WallPassed:
             self.restore(before)
+            return self._take(t, dt)
+        except Impact:
+            self.restore(before)
+            self.coupled.impacts.start_anew(dt)
             return self._take(t, dt)
 
     def _take_once(self, t: float, dt: float) -> StepInfo:

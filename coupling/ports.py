@@ -379,6 +379,10 @@ class StartOfSolid(Protocol):
         """Whether the last step took the impulse of an impulsive start, by backward Euler."""
         ...
 
+    def strike(self, dt: float) -> None:
+        """Prepare a step of length dt [s] in which contact closes."""
+        ...
+
     def begin(self) -> None:
         """Begin a start after such a step."""
         ...
@@ -427,6 +431,15 @@ class StartOfFlow(Protocol):
 
     def end_impulse(self, dt: float) -> None:
         """Take the velocity of the last start step for the initial one; dt [s]: length of the first step."""
+        ...
+
+    @property
+    def counts_earlier(self) -> bool:
+        """Whether the formulas of the next steps count velocities from before the last."""
+        ...
+
+    def forget_earlier(self) -> None:
+        """Let the next steps count no velocity from before the last, as those after the initial one."""
         ...
 
     def forget_step(self) -> None:

@@ -68,6 +68,9 @@ class RigidStart:
         finally:
             field.scheme = own
 
+    def strike(self, dt: float) -> None:
+        """Impacts have their own law."""
+
     def repeat(self) -> None:
         """Not called: there is one step."""
 

@@ -80,6 +80,10 @@ class History:
         self.past = [self.past[0], *back]
         self.steps, self._scale_step = (dt,) * len(self.past), dt
 
+    def forget_earlier(self) -> None:
+        """Begin a new sequence of steps from the last velocity."""
+        self.steps = ()
+
     def begin_step(self, pressure: Array) -> None:
         """Keep the pressure [Pa] at the beginning of a step, at local dofs, zero where there is none."""
         self._pressure = pressure

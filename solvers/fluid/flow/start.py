@@ -95,6 +95,15 @@ class FlowStart:
         """Take the velocity of the last start step for the initial one; dt [s]: length of the first step."""
         self.fluid.end_impulse(dt)
 
+    @property
+    def counts_earlier(self) -> bool:
+        """Whether the formulas of the next steps count velocities from before the last."""
+        return self.accelerates and len(self.fluid.history.steps) > 0
+
+    def forget_earlier(self) -> None:
+        """Let the next steps count no velocity from before the last, as those after the initial one."""
+        self.fluid.history.forget_earlier()
+
     def forget_step(self) -> None:
         """Let the first step start from the present history."""
         self.fluid.forget_step()
