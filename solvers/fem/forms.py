@@ -101,14 +101,28 @@ def volume_measure(domain: Domain, degree: int) -> ufl.Measure:
     return ufl.Measure("dx", domain=domain.mesh, metadata={"quadrature_degree": degree})
 
 
-def constant(domain: Domain, value: float) -> fem.Constant:
-    """A number that can change without recompiling the form."""
+def constant(domain: Domain, value: float | Array) -> fem.Constant:
+    """A number or vector that can change without recompiling the form."""
     return fem.Constant(domain.mesh, PETSc.ScalarType(value))
 
 
 def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
     """Sum of a functional over all processes."""
     return comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
+
+
+def direction(domain: Domain) -> fem.Constant:
+    """The unit vector that `assemble_components` sets."""
+    return constant(domain, np.zeros(domain.dim))
+
+
+def assemble_components(form: Any, along: fem.Constant, comm: MPI.Comm) -> list[float]:
+    """Sums of a functional that is linear in a direction, for each axis: one form for all."""
+    found = []
+    for axis in np.eye(len(along.value)):
+        along.value = axis
+        found.append(assemble_scalar(form, comm))
+    return found
 
 
 def assemble_vector(form: Any, out: Array) -> None:
