@@ -24,6 +24,7 @@ from solvers.fem.facewise import Facewise
 from solvers.fem.forms import (
     COMPILE_OPTIONS,
     Integral,
+    assemble_components,
     assemble_matrix,
     assemble_scalar,
     assemble_vector,
@@ -33,6 +34,7 @@ from solvers.fem.forms import (
     compile_integrals,
     constant,
     create_matrix,
+    direction,
     measure,
     surface_measure,
     volume_measure,

@@ -14,9 +14,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import IO, Any
 
 from ffcx.codegeneration import jit
+
+from solvers.fem import libraries
 
 #: Time [s] that a program without such locks has from its last change of the .c file.
 FOREIGN = 30.0
@@ -26,8 +29,8 @@ INTERVAL = 0.2
 
 _listeners: list[Callable[[str], None]] = []
 
-#: What modules gave, by their names and objects: to import one again lists all of the cache, which may be large.
-_loaded: dict[tuple[str, str, tuple[str, ...]], tuple[Any, Any]] = {}
+#: what FFCx's compiler calls, and is given another of here
+_REPLACED = ("get_cached_module", "_load_objects", "cffi")
 
 
 @contextmanager
@@ -51,33 +54,27 @@ def compiling(what: str) -> Iterator[None]:
 
     They are silent: setuptools reports every compiler call at INFO on the root logger, and sets its level itself.
     """
-    disabled, original = logging.root.manager.disable, jit.get_cached_module
+    disabled, originals = logging.root.manager.disable, {name: getattr(jit, name) for name in _REPLACED}
     locks: list[IO[bytes]] = []
 
     def get_cached_module(name: str, objects: list[str], cache_dir: Path, timeout: int) -> tuple[Any, Any]:
-        key = (str(cache_dir), name, tuple(objects))
-        if key in _loaded:
-            return _loaded[key]
         source = Path(cache_dir) / f"{name}.c"
         lock = None if _ready(source) else _take(source, what)
         if lock is None:
-            if not source.exists():  # DOLFINx looks for it first
-                source.touch()
-            found = original(name, objects, cache_dir, timeout)
-            if found[1] is not None:
-                _loaded[key] = found
-            return found
+            return libraries.load(source.parent, name, objects)
         locks.append(lock)
         _say(f"compiling {what}")
         source.write_bytes(b"")
         return None, None
 
     logging.disable(logging.INFO)
-    jit.get_cached_module = get_cached_module
+    jit.get_cached_module, jit._load_objects = get_cached_module, libraries.load
+    jit.cffi = SimpleNamespace(FFI=libraries.Builder)
     try:
         yield
     finally:
-        jit.get_cached_module = original
+        for name, original in originals.items():
+            setattr(jit, name, original)
         logging.disable(disabled)
         for lock in locks:
             if _ready(Path(lock.name)):

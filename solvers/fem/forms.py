@@ -21,10 +21,12 @@ from solvers.fem.domain import Domain
 
 #: Sums may be reordered: newer form compilers write a product per term, and a tangent of the flow takes 24 instead of
 #: 59 us per cell once common factors are taken out. Infinities and NaN keep their meaning. Without what only debuggers
-#: read (-g0) the compiler takes four fifths of the time.
+#: read (-g0) the compiler takes four fifths of the time. The last name, which the compiler ignores, tells the
+#: cache these libraries from Python modules of the same form.
 COMPILE_OPTIONS = {
     "cffi_extra_compile_args": [
         "-O3", "-march=native", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-g0",
+        "-DPLAIN_LIBRARY",
     ]
 }  # fmt: skip
 
@@ -99,14 +101,28 @@ def volume_measure(domain: Domain, degree: int) -> ufl.Measure:
     return ufl.Measure("dx", domain=domain.mesh, metadata={"quadrature_degree": degree})
 
 
-def constant(domain: Domain, value: float) -> fem.Constant:
-    """A number that can change without recompiling the form."""
+def constant(domain: Domain, value: float | Array) -> fem.Constant:
+    """A number or vector that can change without recompiling the form."""
     return fem.Constant(domain.mesh, PETSc.ScalarType(value))
 
 
 def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
     """Sum of a functional over all processes."""
     return comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
+
+
+def direction(domain: Domain) -> fem.Constant:
+    """The unit vector that `assemble_components` sets."""
+    return constant(domain, np.zeros(domain.dim))
+
+
+def assemble_components(form: Any, along: fem.Constant, comm: MPI.Comm) -> list[float]:
+    """Sums of a functional that is linear in a direction, for each axis: one form for all."""
+    found = []
+    for axis in np.eye(len(along.value)):
+        along.value = axis
+        found.append(assemble_scalar(form, comm))
+    return found
 
 
 def assemble_vector(form: Any, out: Array) -> None:

@@ -116,8 +116,8 @@ def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices32:
 # -------------------------------------------------------------------------------------------------------------- spaces
 
 
-def function_space(mesh: dolfinx_mesh.Mesh, element: Any) -> Any:
-    """The space of an element on a mesh."""
+def function_space(mesh: dolfinx_mesh.Mesh, element: Any, options: dict[str, Any]) -> Any:
+    """The space of an element on a mesh; elements are not compiled here."""
     return fem.functionspace(mesh, element)
 
 

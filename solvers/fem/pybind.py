@@ -99,9 +99,9 @@ def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices32:
 # -------------------------------------------------------------------------------------------------------------- spaces
 
 
-def function_space(mesh: dolfinx_mesh.Mesh, element: Any) -> Any:
+def function_space(mesh: dolfinx_mesh.Mesh, element: Any, options: dict[str, Any]) -> Any:
     """The space of an element on a mesh."""
-    return fem.FunctionSpace(mesh, element)
+    return fem.FunctionSpace(mesh, element, jit_params=options)
 
 
 def cell_blocks(space: Any) -> Indices32:

@@ -14,6 +14,7 @@ from solvers.api import Array
 from solvers.fem.calls import calls
 from solvers.fem.compiling import compiling
 from solvers.fem.domain import Domain, input_nodes
+from solvers.fem.forms import COMPILE_OPTIONS
 from solvers.mesh.cell_types import CELL_TYPES
 
 
@@ -22,35 +23,34 @@ def cell_of(domain: Domain) -> str:
     return CELL_TYPES[domain.cell_type].shape.name
 
 
+def _space(domain: Domain, element: Any) -> Any:
+    with compiling("an element"):
+        return calls.function_space(domain.mesh, element, COMPILE_OPTIONS)
+
+
 def vector_space(domain: Domain) -> Any:
     """Isoparametric vector Lagrange space: one dof block per node."""
-    with compiling("an element"):
-        return calls.function_space(domain.mesh, calls.lagrange_element(cell_of(domain), domain.degree, (domain.dim,)))
+    return _space(domain, calls.lagrange_element(cell_of(domain), domain.degree, (domain.dim,)))
 
 
 def scalar_space(domain: Domain) -> Any:
     """Isoparametric scalar Lagrange space: one dof per node."""
-    with compiling("an element"):
-        return calls.function_space(domain.mesh, calls.lagrange_element(cell_of(domain), domain.degree))
+    return _space(domain, calls.lagrange_element(cell_of(domain), domain.degree))
 
 
 def cellwise_space(domain: Domain) -> Any:
     """Space of piecewise constants: one number per cell."""
-    with compiling("an element"):
-        return calls.function_space(domain.mesh, calls.discontinuous_element(cell_of(domain), 0))
+    return _space(domain, calls.discontinuous_element(cell_of(domain), 0))
 
 
 def pressure_space(domain: Domain) -> Any:
     """Discontinuous scalars: constant in first-order cells, linear in second-order cells."""
-    with compiling("an element"):
-        element = calls.discontinuous_element(cell_of(domain), domain.degree - 1)
-        return calls.function_space(domain.mesh, element)
+    return _space(domain, calls.discontinuous_element(cell_of(domain), domain.degree - 1))
 
 
 def broken_space(domain: Domain) -> Any:
     """Scalars with values of their own at the nodes of each cell."""
-    with compiling("an element"):
-        return calls.function_space(domain.mesh, calls.broken_element(cell_of(domain), domain.degree))
+    return _space(domain, calls.broken_element(cell_of(domain), domain.degree))
 
 
 def flow_space(domain: Domain, velocity_degree: int) -> Any:
@@ -64,8 +64,7 @@ def flow_space(domain: Domain, velocity_degree: int) -> Any:
     else:
         velocity = calls.lagrange_element(cell, velocity_degree, (domain.dim,))
         element = calls.mixed_element([velocity, calls.lagrange_element(cell, 1)])
-    with compiling("an element"):
-        return calls.function_space(domain.mesh, element)
+    return _space(domain, element)
 
 
 def cell_blocks(space: Any) -> NDArray[np.int32]:
@@ -165,8 +164,7 @@ def facet_dofs(space: Any, component: int, facets: NDArray[np.int32]) -> NDArray
 
 def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -> Any:
     """Values at the points of the quadrature rule of a degree; shape () for scalars, (n,) vectors, (n, m) tensors."""
-    with compiling("an element"):
-        return calls.function_space(domain.mesh, calls.quadrature_element(cell_of(domain), degree, shape))
+    return _space(domain, calls.quadrature_element(cell_of(domain), degree, shape))
 
 
 def quadrature_points(domain: Domain, degree: int) -> tuple[Array, Array]:

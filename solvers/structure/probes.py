@@ -59,27 +59,26 @@ def on_surface(structure: Structure, body: Body, quantity: str, surface: str) ->
     """
     if quantity == "reaction":
         return _reaction(structure, body, surface)
-    ds = fem.surface_measure(body.domain, surface, body.mass_degree)
+    ds, along = fem.surface_measure(body.domain, surface, body.mass_degree), fem.direction(body.domain)
+    if quantity == "traction":
+        P = forms.first_piola_kirchhoff(body.u, body.element, body.active)
+        resultant = fem.compile_form(ufl.dot(P * ufl.FacetNormal(body.domain.mesh), along) * ds)
+
+        def force() -> dict[str, float]:
+            body.element.prepare_output()
+            return _components(fem.assemble_components(resultant, along, structure.comm))
+
+        return force
     area = fem.compile_form(fem.constant(body.domain, 1.0) * ds)
     if quantity == "area":
         return lambda: {"": fem.assemble_scalar(area, structure.comm)}
-    if quantity == "displacement":
-        mean = [fem.compile_form(body.u[i] * ds) for i in range(body.dim)]
+    total = fem.compile_form(ufl.dot(body.u, along) * ds)
 
-        def displacement() -> dict[str, float]:
-            size = fem.assemble_scalar(area, structure.comm)
-            return _components([fem.assemble_scalar(form, structure.comm) / size for form in mean])
+    def displacement() -> dict[str, float]:
+        size = fem.assemble_scalar(area, structure.comm)
+        return _components([one / size for one in fem.assemble_components(total, along, structure.comm)])
 
-        return displacement
-    P = forms.first_piola_kirchhoff(body.u, body.element, body.active)
-    traction = P * ufl.FacetNormal(body.domain.mesh)
-    resultant = [fem.compile_form(traction[i] * ds) for i in range(body.dim)]
-
-    def force() -> dict[str, float]:
-        body.element.prepare_output()
-        return _components([fem.assemble_scalar(form, structure.comm) for form in resultant])
-
-    return force
+    return displacement
 
 
 def _reaction(structure: Structure, body: Body, surface: str) -> Probe:

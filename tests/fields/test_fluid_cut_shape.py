@@ -96,7 +96,7 @@ def test_nearly_exact_in_a_flow(dim):
     assert (before > 3.0 * now).all()
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_nearer_to_differences_with_second_degree(dim):
     """Momentum lacks the penalty of poorly cut cells, also with exact integrands at surfaces (0.14 in 2D, 0.19)."""
     now, before = errors(dim, element="q2q1"), errors(dim, element="q2q1", shape=False)

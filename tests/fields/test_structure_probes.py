@@ -8,6 +8,7 @@ from advised import require_advice
 from structure_setup import TIGHT, block, constant, load_step, make_structure, vector
 
 from fsci import shapes
+from solvers import fem
 from solvers.api import FailureKind, StepFailed
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure import probes
@@ -52,6 +53,16 @@ def test_traction_is_the_load():
     assert surface_probe(structure, "traction", "right")["x"] == pytest.approx(3.0, rel=1e-10)
     assert surface_probe(structure, "traction", "left")["x"] == pytest.approx(-3.0, rel=1e-10)
     assert abs(surface_probe(structure, "traction", "top")["y"]) < 1e-10
+
+
+def test_all_directions_share_a_form(monkeypatch):
+    """A mean has one for the area besides."""
+    structure = make_structure(block("tetra10", 2), MATERIAL)
+    compiled, original = [], fem.compile_form
+    monkeypatch.setattr(fem, "compile_form", lambda form, *more: compiled.append(form) or original(form, *more))
+    surface_probe(structure, "displacement", "top")
+    surface_probe(structure, "traction", "top")
+    assert len(compiled) == 3
 
 
 def test_homogeneous_deformation():

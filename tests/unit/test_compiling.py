@@ -7,13 +7,13 @@ import sys
 import time
 
 import pytest
-from ffcx.codegeneration import jit
+import ufl
+from dolfinx.fem import form as dolfinx_form
 from mpi4py import MPI
 from programs import ENVIRONMENT
 
 from fsci import shapes
 from solvers import fem
-from solvers.fem import compiling
 
 PROGRAM = """\
 import sys
@@ -109,13 +109,17 @@ def test_process_killed_while_it_compiles(tmp_path):
     assert done.stdout.endswith("[2.0, 9.0]\n")
 
 
-def test_a_compiled_form_is_imported_once(monkeypatch):
-    """Another form that is the same finds the module in memory: importing lists the whole cache."""
-    domain = fem.distribute(MPI.COMM_SELF, shapes.rectangle([1, 1], [1, 1]))
-    imported, original = [], jit.get_cached_module
-    monkeypatch.setattr(jit, "get_cached_module", lambda name, *given: imported.append(name) or original(name, *given))
-    monkeypatch.setattr(compiling, "_loaded", {})
-    for value in (2.0, 3.0, 4.0):
-        form = fem.compile_form(fem.constant(domain, value) * fem.volume_measure(domain, 1))
-        assert fem.assemble_scalar(form, MPI.COMM_SELF) == value
-    assert len(imported) == 1
+def test_forms_are_plain_libraries(cache):
+    """They have their functions alone: a module's description of the same structures takes longer to compile."""
+    folder, _ = cache
+    sources = [path.read_text() for path in (folder / "fenics").glob("libffcx_*.c")]
+    assert len(sources) >= 2
+    assert not [text for text in sources if "Python.h" in text]
+
+
+def test_numbers_of_a_library_are_those_of_a_module():
+    """DOLFINx compiles the same form as a Python module where it is called without `compiling`."""
+    domain = fem.distribute(MPI.COMM_SELF, shapes.rectangle([2, 1], [2, 1]))
+    form = ufl.SpatialCoordinate(domain.mesh)[0] ** 2 * fem.volume_measure(domain, 2)
+    values = [fem.assemble_scalar(compiled, MPI.COMM_SELF) for compiled in (fem.compile_form(form), dolfinx_form(form))]
+    assert values == pytest.approx([8 / 3, 8 / 3], rel=1e-14)

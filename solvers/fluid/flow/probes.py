@@ -185,15 +185,16 @@ def force_on_patch(fluid: Fluid, patch: str) -> Probe:
     (collective)
     """
 
-    def integrals() -> list[fem.Integral]:
+    def integral() -> tuple[fem.Integral, Any]:
         domain = fluid.grid.domain
+        along = fem.direction(domain)
         u, p = fluid.unknowns.parts(fluid.system.flow)
         n = ufl.FacetNormal(domain.mesh)
         force = p * n - ufl.dot(forms.viscous_stress(fluid.system.terms, u), n)
         ds = fem.measure(domain, "ds", fluid.unknowns.degree)
-        return [fem.Integral(domain, force[axis] * ds) for axis in range(fluid.dim)]
+        return fem.Integral(domain, ufl.dot(force, along) * ds), along
 
-    latest = renewed(fluid, integrals)
+    latest = renewed(fluid, integral)
 
     def on_covered(part: CoveredFaces) -> Array:
         mu = fluid.system.viscosity.of(part.cells)
@@ -203,7 +204,8 @@ def force_on_patch(fluid: Fluid, patch: str) -> Probe:
 
     def probe() -> dict[str, float]:
         facets, covered = _facets(fluid, [patch])
-        whole = np.array([fem.assemble_scalar(form.on(exterior_facet=facets), fluid.comm) for form in latest()])
+        force, along = latest()
+        whole = np.array(fem.assemble_components(force.on(exterior_facet=facets), along, fluid.comm))
         return _components(whole + fluid.comm.allreduce(sum((on_covered(p) for p in covered), np.zeros(fluid.dim))))
 
     return probe
