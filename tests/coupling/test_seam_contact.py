@@ -170,6 +170,31 @@ def test_without_periods_they_do_not_meet(tmp_path):
     assert not any(row["contact.active"] for row in dry(tmp_path, (2.0, 0.0))[1])
 
 
+def wet(x, free):
+    """A free disc or an elastic one meets an elastic one in the flow, at the middle x + 1 [m]."""
+    ((a, b), (c, d)), speeds = PLACES, (1, -1)
+    first = ELASTIC.format(k=0, x=a + x, y=b, E=400, speed=speeds[0])
+    second = ELASTIC.format(k=1, x=c + x, y=d, E=400, speed=speeds[1])
+    elastic = SOFT.format(disc=second if free else first + second)
+    return discs((a + x, b), speeds=speeds[:1]) + elastic if free else elastic
+
+
+@pytest.mark.parametrize(
+    ("free", "scheme"),
+    [
+        (False, "monolithic"),
+        pytest.param(True, "monolithic", marks=pytest.mark.slow),
+        pytest.param(False, "partitioned", marks=pytest.mark.slow),
+    ],
+)
+def test_elastic_discs_in_a_flow(tmp_path, free, scheme):
+    """They touch right at the end of the channel, and some periods away."""
+    known = motion(tmp_path, wet(0.0, free), scheme=scheme)
+    assert max(row["contact.active"] for row in known[1]) > 1.0
+    for x in (1.0, -5.0):
+        same(motion(tmp_path, wet(x, free), scheme=scheme), known, 1e-7 if scheme == "partitioned" else 1e-8)
+
+
 FLOOR = """\
     e{k}:
       mesh: {{shape: disc, radius: 0.2, cells: [20, 3], translate: [{x}, 0.205]}}
