@@ -213,6 +213,7 @@ def test_the_level_of_the_pressure_changes_nothing():
     fluid.flow[~fluid.unknowns.velocity_mask] += 1e4
     (found,), (expected,) = measure(fluid), before
     assert found.layer == pytest.approx(expected.layer, rel=1e-6)
+    assert found.share == pytest.approx(expected.share, rel=1e-6)  # it pushes at the foot, along another axis
 
 
 def test_fluid_at_rest_says_nothing():

@@ -8,10 +8,11 @@ change the velocity by U linearly,
 U the largest velocity relative to the body within half of its extent around it. Gaps count by what acts there: the
 share of the force in them is the part of int |t - t_0 n| dS over the surface that lies in front of another wall, within
 `NARROW` cells and the extent of the body; t is the traction and t_0 the median of its normal part, which the level of
-the pressure changes. Force on the rest of the body that nothing there explains is that of a film whose friction holds
-it: a plug that squeezes fluid through the gaps beside it. So is the pressure on the rest, as (V / U)^2, where V is the
-largest velocity in the film: a flap that leaves a narrow way, in which the flow is fastest, has in front of it the
-pressure that drives the flow through there, against friction and as the dynamic pressure rho V^2 / 2.
+the pressure changes. This level pushes bodies that are dry on one side: the rest counts beside that push. Force on the
+rest that nothing there explains is that of a film whose friction holds it: a plug that squeezes fluid through the gaps
+beside it. So is the pressure on the rest, as (V / U)^2, where V is the largest velocity in the film: a flap that leaves
+a narrow way, in which the flow is fastest, has in front of it the pressure that drives the flow through there, against
+friction and as the dynamic pressure rho V^2 / 2.
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Ar
     normal, speed = unit_normals(scene.corners), _speed(fluid, body)
     along = np.einsum("fi,fi->f", force, normal)
     level = _median(along / np.maximum(wet, 1e-300), np.where(scene.owner == body, wet, 0.0))
-    acting = np.linalg.norm(force - level * wet[:, None] * normal, axis=1)
+    own = np.where(scene.owner == body, wet, 0.0)[:, None] * normal
+    apart = force - level * wet[:, None] * normal
+    acting = np.linalg.norm(apart, axis=1)
     shear = np.linalg.norm(force - along[:, None] * normal, axis=1)
     dynamic = fluid.settings.density * speed**2 * wet if fluid.settings.convection else 0.0
     samples, of_flow = scene.samples, scene.of_samples(shear + dynamic)
@@ -82,10 +85,21 @@ def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Ar
         caused = max(rest, min(1.0, through / max(speed, 1e-300)) ** 2 * of_pressure)
         beyond[film] = min(caused, drop * float(area[free].sum()))
     found = shape_of(scene, body, all_of_it, counts, beyond)
+    around_body = np.array([scene.of_samples(np.abs(part))[free].sum() for part in apart.T])
+    found = replace(found, share=found.share * beside_level(around_body, np.abs(level * own.sum(axis=0))))
     if drag == 0.0:
         return replace(found, layer=np.inf)
     across = float((area / samples.across)[free].sum())  # the area in cells along the normal
     return replace(found, layer=fluid.settings.viscosity * speed * across / drag)
+
+
+def beside_level(force: Array, push: Array) -> float:
+    """Mean over the axes, weighted by a force [N], of its share in this force and the push of the pressure's level [N].
+
+    Where a body is dry on one side, the level pushes it towards there. It is no flow, and has no error. Along other
+    axes it changes nothing.
+    """
+    return float((force**2 / np.maximum(force + push, 1e-300)).sum() / max(float(force.sum()), 1e-300))
 
 
 def pressure_drop(scene: SurfaceScene, film: NDArray[np.int64], friction: Array) -> float:
