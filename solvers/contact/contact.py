@@ -124,14 +124,14 @@ class Contact:
 
     def begin_step(self) -> None:
         """Store the positions and active set at the start of a step."""
-        self.x_old = self.x.copy()
+        before, self.x_old = self.x_old, self.x.copy()
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
         self._stiffnesses.begin_step()
         cycled, self._begun = self.active_set.returned & self._begun, True
         self.active_set.begin_step()
-        self._integration.begin_step(self.x, self.active_set.active, cycled)
+        self._integration.begin_step(self.x, before, self.active_set.active, cycled)
         self._condensation = self.slip = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
 
@@ -468,6 +468,7 @@ class Contact:
         return {
             "z": self.z.copy(),
             "x": self.x.copy(),
+            "x_old": self.x_old.copy(),
             "mean_gap": self._mean_gap.copy(),
             "status": self.active_set.status.copy(),
             "present": self.present.copy(),
@@ -483,6 +484,7 @@ class Contact:
         self._integration.search_anew()
         self.z[:] = state["z"]
         self.x[:] = state["x"]
+        self.x_old = state["x_old"].copy()
         self._mean_gap = state["mean_gap"].copy()
         self.active_set.status = state["status"].copy()
         self.present = state["present"].copy()

@@ -110,15 +110,16 @@ class Integration:
                 look_farther(mine, self._multipliers, x, x_old, enough)
         self.search_anew()
 
-    def begin_step(self, x: Array, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
-        """Begin a step at the positions x [m], shape (N, dim); masks, shape (C,).
+    def begin_step(self, x: Array, before: Array, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
+        """Begin a step at the positions x [m], before: those at the beginning of the last one, (N, dim); masks, (C,).
 
         active: of the multipliers in contact; cycled: of those by which the step failed that is taken again.
         """
         self.shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(x, active)
-        self._sliding.begin_step(x, self._travel)
+        if self.slides:
+            self._sliding.begin_step(x, before, active, self._travel)
         self.rims.begin_step(active, cycled)
 
     def move(self, dx: Array) -> None:

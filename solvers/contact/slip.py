@@ -2,15 +2,16 @@
 
     D_j^n s_j = -[(W - W^n) x_slave - (M - M^n) x_master]_j
 
-with positions x of the iterate (docs/theory_contact.md, Friction). W_jk = int Phi_j N_k equals D where the area is
-fully covered. Laws use the tangential part of the slip only.
+with positions x of the iterate (docs/theory_contact.md, Friction). Nodes that will touch in the step have the
+integrals W^n and M^n of where they do. W_jk = int Phi_j N_k equals D where the area is fully covered. Laws use the
+tangential part of the slip only.
 Source: Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth. Engng 84 (2010), section 3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,19 @@ class Beginning:
     offset: Array  #: -M^n times the ways of images of masters, shape (C, dim)
     D: Array  #: shape (C,)
     covered: Array  #: int N_j where the masters of each pair cover the slave, for laws by pair, shape (C, pairs)
+    normals: Array  #: shape (C, dim)
+
+    def gaps(self, x: Array) -> Array:
+        """Mean gaps [m] at the positions x [m] that it belongs to, NaN where nothing is covered, shape (C,)."""
+        weighted = -np.einsum("nd,nd->n", self.difference @ x + self.offset, self.normals)
+        return np.divide(weighted, self.D, out=np.full_like(self.D, np.nan), where=self.D > 0.0)
+
+    def towards(self, later: Beginning, share: Array) -> Beginning:
+        """Linear interpolation of the integrals over D; share: of the later ones by multiplier, shape (C,)."""
+        own, other = 1.0 - share, np.divide(share * self.D, later.D, out=np.zeros_like(share), where=share > 0.0)
+        difference = self.difference.scaled_rows(own) + later.difference.scaled_rows(other)
+        offset = own[:, None] * self.offset + other[:, None] * later.offset
+        return replace(self, difference=difference, slopes=expand(difference, offset.shape[1]), offset=offset)
 
 
 @dataclass(frozen=True)
@@ -68,20 +82,38 @@ class Sliding:
         self._count, self._shape = len(multipliers.node), shape
         self._beginning: Beginning | None = None
 
-    def begin_step(self, x: Array, travel: float) -> None:
-        """Integrals at the positions x [m] at the beginning of a step, (N, dim); travel: see `Mortar.near`."""
+    def begin_step(self, x: Array, before: Array, active: NDArray[np.bool_], travel: float) -> None:
+        """Integrals at the beginning of a step, at open nodes that approach where they will touch.
+
+        They touch where they come if all nodes move on as in the step before: from the beginning of the step, the part
+        of the slip before the contact would be of first order.
+
+        x, before: positions at the beginning of this step and of the last one [m], (N, dim); active: mask of the
+        multipliers in contact, (C,); travel: see `Mortar.near`.
+        """
+        here = self._beginning = self._integrals(x, travel)
+        gap = here.gaps(x)
+        if not (~active & (gap > 0.0)).any() or np.array_equal(x, before):
+            return
+        there = self._integrals(2.0 * x - before, travel)
+        after = there.gaps(2.0 * x - before)
+        approach = ~active & (gap > 0.0) & (after < gap)
+        share = np.divide(gap, gap - after, out=np.zeros_like(gap), where=approach)
+        self._beginning = here.towards(there, np.minimum(share, 1.0))
+
+    def _integrals(self, x: Array, travel: float) -> Beginning:
+        """Those at the positions x [m], (N, dim)."""
         (N, dim, pairs), C = self._shape, self._count
         if all(travel < mortar.clear_until for mortar in self.mortars):
             # all integrals are zero; other pairs, or these by a long step, may still meet
             none = nothing((C, N)), nothing((dim * C, dim * N))
-            self._beginning = Beginning(*none, np.zeros((C, dim)), np.zeros(C), np.zeros((C, pairs)))
-            return
+            return Beginning(*none, np.zeros((C, dim)), np.zeros(C), np.zeros((C, pairs)), np.zeros((C, dim)))
         D, covered, offset, parts = np.zeros(C), np.zeros((C, pairs)), np.zeros((C, dim)), []
-        normals = find_normals(self._multipliers, x) if self.mortars else None
+        normals = find_normals(self._multipliers, x)
         for index, mortar in enumerate(self.mortars):
             facet_pairs, _ = mortar.near(x, x, travel, beyond=mortar.edge)
             facet_pairs = self._shares.mine(index, facet_pairs, len(mortar.facets))
-            if normals is None or len(facet_pairs) == 0:
+            if len(facet_pairs) == 0:
                 continue
             at_nodes = normals.at(self._multipliers, mortar.patch)[0]
             found, W, M = mortar.begin(x, at_nodes, facet_pairs)
@@ -94,7 +126,7 @@ class Sliding:
                     covered[rows, pair] += mortar.covered(x, at_nodes, facet_pairs[pair_of == pair])
             parts += [(W, rows, mortar.patch.nodes), (-M, rows, mortar.masters.nodes)]
         D, covered, offset, difference = self._shares.total_of(D, covered, offset, add_up(parts, (C, N)))
-        self._beginning = Beginning(difference, expand(difference, dim), offset, D, covered)
+        return Beginning(difference, expand(difference, dim), offset, D, covered, normals.values)
 
     def evaluate(
         self,

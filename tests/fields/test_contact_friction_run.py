@@ -216,3 +216,29 @@ def test_slips_that_alternate_stick(tmp_path, step, size, shift):
     assert floor == pytest.approx(lid, rel=1e-6)
     smooth = squeezed_ring(tmp_path / "smooth", step, size, shift, 0.0)["contact.floor.y"]
     assert floor == pytest.approx(smooth, rel=5e-3)
+
+
+OBLIQUE = """
+time: {{step: {step}, end: 1}}
+structure:
+  bodies:
+    block:
+      mesh: {{shape: rectangle, size: [1, 0.5], cells: [4, 2], order: {order}, origin: [0, 0.01]}}
+      material: {{law: neo_hooke, E: 1000, nu: 0, density: 1}}
+      supports: [{{on: top, displacement: ["0.02*t", "-0.03*t"]}}]
+contact:
+  obstacles: {{floor: {{mesh: {{shape: rectangle, size: [3, 0.2], cells: [3, 1], origin: [-1, -0.2]}}, on: top}}}}
+  pairs: {{floor: {{slave: {{body: block, on: bottom}}, master: {{obstacle: floor}}, friction: {{coefficient: 3}}}}}}
+probes: {{bottom: {{body: block, quantity: displacement, on: bottom}}}}
+"""
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("step", [0.25, 0.1, 0.2])
+def test_a_block_sticks_where_it_touches(tmp_path, step, order):
+    """It comes obliquely and touches at t = 1/3, within a step: its bottom stays there, 0.02/3 to the side."""
+    (tmp_path / "case.yaml").write_text(OBLIQUE.format(step=step, order=order))
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
+    history = read_history(tmp_path / "out" / "history.csv")
+    assert history["contact.sticking"][-1] > 0
+    assert history["bottom.x"][history["time"] > 0.34] == pytest.approx(0.02 / 3, rel=1e-6)
