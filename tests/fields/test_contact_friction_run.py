@@ -179,7 +179,9 @@ structure:
       mesh: {shape: disc, radius: 5.0e-3*S, cells: [24, 4], order: 2, translate: [SHIFT*S, 5.0e-3*S]}
       material: {law: neo_hooke, E: 2.0e+6, nu: 0.49}
       element: mixed
-      supports: [{at: [SHIFT*S, 5.0e-3*S], direction: [1, 0], displacement: 0}]
+      supports:
+        - {at: [SHIFT*S, 5.0e-3*S], direction: [1, 0], displacement: 0}
+        - {at: [SHIFT*S, 8.93790e-3*S], direction: [1, 0], displacement: 0}  # without friction nothing else holds its turn
 contact:
   friction: {coefficient: MU}
   obstacles:
