@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,6 @@ from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.overlap import facets_in_each_other
 from fsci.builder.periods import periods
 from fsci.case import Case, CaseError
-from fsci.case.contact import PairSection
 from fsci.meshes.of_case import read_rigid_side
 from solvers.api import Array
 from solvers.contact import law as laws
@@ -80,16 +79,9 @@ def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodie
             sides.append(found[key])
         law = named(laws, settings.law)(*settings.law_parameters)
         deep = facets_in_each_other(case, comm, settings, meshes)
-        pairs.append(
-            Pair(sides[0], sides[1], settings.integration, law, deep, interference_of(settings), always=in_flow)
-        )
+        overlap = settings.overlap if settings.interference is not None else None
+        pairs.append(Pair(sides[0], sides[1], settings.integration, law, deep, overlap, always=in_flow))
     return pairs
-
-
-def interference_of(pair: PairSection) -> Callable[[float], float] | None:
-    """A function: time [s] -> overlap [m] of the bodies as meshed."""
-    formula = pair.interference
-    return None if formula is None else lambda t: float(formula(np.zeros((3, 1)), t)[0])
 
 
 def _obstacle(case: Case, comm: MPI.Comm, name: str, rigid: RigidBodies | None) -> Surface:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Discriminator, Tag, model_validator
 
 from fsci.case.fluid import Movement
@@ -117,6 +118,10 @@ class PairSection(Section):
         """The arguments of the law."""
         given = () if self.tied or self.friction is None else (self.friction.coefficient, self.friction.bound)
         return tuple(value for value in given if value is not None)
+
+    def overlap(self, t: float) -> float:
+        """The interference [m] at the time t [s]: by how much the bodies as meshed overlap; zero if none is given."""
+        return 0.0 if self.interference is None else float(self.interference(np.zeros((3, 1)), t)[0])
 
     @property
     def sides(self) -> tuple[tuple[str, Side], tuple[str, Side]]:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from fsci.builder.contact import interference_of
 from fsci.case import Case
 from fsci.case.contact import PairSection, Side
 from fsci.meshes.curved import facet_offset
@@ -20,10 +19,10 @@ LOST_IN_FACETS = 0.05
 def faceted_fits(case: Case, meshes: Mapping[str, Mesh], pairs: Mapping[str, PairSection]) -> Iterator[tuple[str, str]]:
     """Warnings about pairs with an interference, with the name of the pair; meshes: of the elastic bodies."""
     for name, pair in pairs.items():
-        if (interference := interference_of(pair)) is None:
+        if pair.interference is None:
             continue
         times = np.linspace(case.time.start, case.time.end, case.time.steps + 1)
-        largest = max(interference(t) for t in times)
+        largest = max(pair.overlap(t) for t in times)
         lost = sum(_offset(case, side, meshes) for _, side in pair.sides)
         if largest > 0.0 and abs(lost) > LOST_IN_FACETS * largest:
             share, word = 100.0 * abs(lost) / largest, "smaller" if lost > 0.0 else "larger"

@@ -181,7 +181,7 @@ structure:
       element: mixed
       supports:
         - {at: [SHIFT*S, 5.0e-3*S], direction: [1, 0], displacement: 0}
-        - {at: [SHIFT*S, 8.93790e-3*S], direction: [1, 0], displacement: 0}  # without friction nothing else holds its turn
+        - {at: [SHIFT*S, 8.93790e-3*S], direction: [1, 0], displacement: 0}  # holds its turn
 contact:
   friction: {coefficient: MU}
   obstacles:
