@@ -36,7 +36,7 @@ AREA = 8 * np.sin(np.pi / 8) + 16 * (2 / 3) * (2 * np.sin(np.pi / 16)) * (1 - np
 
 
 def test_what_flows_in_widens_the_tube(tmp_path):
-    """The volume at the start is that within the surfaces of second order, then it grows by what flows in; nothing is lost."""
+    """The volume at the start is that within the curved surfaces; it grows by what flows in, and nothing is lost."""
     history = run(TUBE, tmp_path)
     volume, flow = history["volume"], history["inlet"] + history["outlet"]
     assert volume[0] + 0.1 * flow[0] == pytest.approx(2 * AREA, rel=1e-9)
