@@ -13,6 +13,8 @@ from solvers.fluid.terms.boundary.patches import Patch
 from solvers.fluid.terms.coupling_entries import interface_entries
 from solvers.fluid.terms.shape_derivatives import film_shape
 from solvers.fluid.terms.shape_derivatives.film_crossings import crossing_moments
+from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 CENTRE = 0.52
 #: of momentum, continuity (which hardly changes) and force
@@ -27,7 +29,14 @@ def disc_at_wall(kappa, slip=0.0, gap=0.03, radius=0.25):
     mover = body("disc", points, facets, motion=lambda x, t: (x + moved, 0.0 * x + [0.0, -0.4]))
     patches = [Patch("wall", ("y-",), "no_slip"), Patch("ends", ("x-", "x+", "y+"), "traction", field(0, 0))]
     fluid = make_fluid(
-        uniform([0, 0], [1, 0.6], [10, 6]), patches, [mover], element="q2q1", scheme="steady", convection=False, mu=0.3
+        uniform([0, 0], [1, 0.6], [10, 6]),
+        patches,
+        [mover],
+        element="q2q1",
+        scheme="steady",
+        convection=False,
+        mu=0.3,
+        solver=SolverSettings(Tolerance(residual=1e-11), linear="direct"),  # rounding of its factors: 4e-12
     )
     if kappa:
         fluid.system.transmissivity = np.full(len(facets), kappa)
