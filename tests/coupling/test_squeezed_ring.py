@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.meshes.of_case import degree_of_cells
+from fsci.meshes.of_case import degree_of_cells, read_body
 from fsci.running.history import read_history
 from fsci.running.run import run_case
-from fsci.shapes import hollow_sphere
 from solvers.mesh.tessellation import tessellate
 
 CASE = """\
@@ -112,7 +111,7 @@ def test_a_hollow_ball_in_contact_is_tight(tmp_path):
     (tmp_path / "case.yaml").write_text(BALL)
     assert run_case(load_case(tmp_path), tmp_path / "out") == 0
     history = read_history(tmp_path / "out" / "history.csv")
-    mesh = hollow_sphere(0.17, 0.27, [3, 1])
+    mesh = read_body(load_case(tmp_path), "ball")
     facets, nodes = tessellate(mesh, ["inner"])
     exact = -np.linalg.det(mesh.points[nodes][facets]).sum() / 6.0
     assert history["contact.active"].max() > 0
