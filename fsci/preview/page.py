@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.preview.draw import FILLED, arrow_ends, closest, extent, loops_of, name_place, opacity
+from fsci.preview.layout import FILLED, arrow_ends, closest, extent, loops_of, name_place, opacity
 from fsci.preview.legend import MARK_COLOURS, NEAR, OTHER_PATCH, PATCHES, colours_of, words_of
 from fsci.preview.parts import NamedSurface, Preview
 from fsci.running.files import write_text

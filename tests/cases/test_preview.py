@@ -10,7 +10,8 @@ from PIL import Image
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.preview.draw import closest, figure_of_plane, loops_of, name_place, opacity
+from fsci.preview.draw import figure_of_plane
+from fsci.preview.layout import closest, loops_of, name_place, opacity
 from fsci.preview.legend import entries, handles
 from fsci.preview.parts import DistantPair, NamedSurface, Preview, nearest, preview_of
 from solvers.mesh.distance import distances_in_pairs
