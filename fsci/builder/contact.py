@@ -14,8 +14,10 @@ from coupling.contact_surfaces import contact_surface
 from fsci.builder.held import is_held
 from fsci.builder.named import named
 from fsci.builder.obstacle_motion import motion_of_obstacle
+from fsci.builder.on_first import shared
 from fsci.builder.overlap import facets_in_each_other
 from fsci.builder.periods import periods
+from fsci.builder.roles import exchanged
 from fsci.case import Case, CaseError
 from fsci.meshes.of_case import read_rigid_side
 from solvers.api import Array
@@ -68,7 +70,9 @@ def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodie
     pairs = []
     in_flow = case.coupling is not None
     meshes = {body.name: body.domain.source for body in bodies}
-    for settings in case.contact.pairs.values():
+    known = {name: mesh for name, mesh in meshes.items() if mesh is not None}  # all of them on the first process
+    others = shared(comm, partial(exchanged, case, known, case.contact.pairs))
+    for name, settings in case.contact.pairs.items():
         sides = []
         for _, side in settings.sides:
             key = (side.body or "", *(side.on or ()), side.obstacle or "")
@@ -80,7 +84,8 @@ def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodie
         law = named(laws, settings.law)(*settings.law_parameters)
         deep = facets_in_each_other(case, comm, settings, meshes)
         overlap = settings.overlap if settings.interference is not None else None
-        pairs.append(Pair(sides[0], sides[1], settings.integration, law, deep, overlap, always=in_flow))
+        one = Pair(sides[0], sides[1], settings.integration, law, deep, overlap, always=in_flow)
+        pairs.append(one.exchanged() if name in others else one)
     return pairs
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -145,11 +144,11 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in coarse(case, bodies, found.pairs)]
     if case.elastic_bodies:
         from fsci.builder.elements import choose_element
+        from fsci.builder.roles import exchanged
         from fsci.builder.wall_pairs import wall_pairs
         from fsci.check.damped_modes import alternating
         from fsci.check.dry_facets import dry_facets
         from fsci.check.faceted_fits import faceted_fits
-        from fsci.check.stiff_slaves import stiff_slaves
         from fsci.check.unpaired import unpaired
 
         for name in case.elastic_bodies:
@@ -166,9 +165,9 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
         found.notes += list(alternating(case, found.meshes))
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in dry_facets(case, bodies)]
-        of_pairs = [stiff_slaves(case, found.meshes, found.pairs), faceted_fits(case, found.meshes, found.pairs)]
-        said_of_pairs = chain.from_iterable(of_pairs)  # of none that the program finds
-        found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in said_of_pairs]
+        pair_at = partial(case.place, "contact", "pairs")  # of none that the program finds
+        found.notes += [f"{pair_at(name)}: {why}" for name, why in exchanged(case, found.meshes, found.pairs).items()]
+        found.warnings += [f"{pair_at(name)}: {text}" for name, text in faceted_fits(case, found.meshes, found.pairs)]
 
 
 def _own_laws(case: Case, found: Findings) -> None:

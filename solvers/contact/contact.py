@@ -443,8 +443,9 @@ class Contact:
         return found
 
     def resultant(self, index: int) -> Array:
-        """Contact force [N] of a pair on its slave side, shape (dim,)."""
-        return np.zeros(self.dim) if self.terms is None else -self.terms.D_of_pair[index] @ self.z
+        """Contact force [N] of a pair on its slave, or on its master if the pair says so, shape (dim,)."""
+        on_master = np.zeros(self.dim) if self.terms is None else self.terms.D_of_pair[index] @ self.z
+        return on_master if self.pairs[index].others else -on_master
 
     @property
     def imbalance(self) -> dict[str, float]:

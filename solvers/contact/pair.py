@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,3 +29,9 @@ class Pair:
     deep: NDArray[np.int32] | None = None
     interference: Callable[[float], float] | None = None  #: time [s] -> overlap [m] of the bodies as meshed; None: zero
     always: bool = False  #: present in all steps, so that its surfaces never have mass
+    others: bool = False  #: its forces are given as those on the master
+
+    def exchanged(self) -> Pair:
+        """The same with the other side as the slave, and its forces on the same side as before."""
+        deep = None if self.deep is None else np.ascontiguousarray(self.deep[:, ::-1])
+        return replace(self, slave=self.master, master=self.slave, deep=deep, others=not self.others)
