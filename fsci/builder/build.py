@@ -72,6 +72,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     bodies = build_bodies(case, comm)
     contact = _contact(case, comm, bodies)
     structure = build_structure(case, comm, bodies, contact, timer)
+    _know_loads(contact, structure)
     return Simulation(
         scheme=structure,
         initialise=structure.initialise,
@@ -118,6 +119,7 @@ def _structure_and_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation
     rigid, bodies = build_free_bodies(case, comm, timer), build_bodies(case, comm)
     contact = _contact(case, comm, bodies, rigid)
     structure = build_structure(case, comm, bodies, contact, timer, rigid)
+    _know_loads(contact, structure, rigid)
     scheme = Composite(Elastic(structure, ()), rigid)
     probes = [
         build_probes(case, "structure", STRUCTURE_PROBES, structure),
@@ -155,6 +157,13 @@ def _contact(case: Case, comm: MPI.Comm, bodies: list[Body], rigid: RigidBodies 
     from fsci.builder.contact import build_contact
 
     return build_contact(case, comm, bodies, rigid)
+
+
+def _know_loads(contact: Contact | None, structure: Structure, rigid: RigidBodies | None = None) -> None:
+    if contact is not None and contact.unheld.bodies:
+        from fsci.builder.contact import know_loads
+
+        know_loads(contact, structure, rigid)
 
 
 def _contact_fields(structure: Structure) -> PartFields | None:
@@ -195,6 +204,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     bodies = build_structure.build_bodies(case, comm)
     contact = _contact(case, comm, bodies, rigid)
     structure = build_structure.build_structure(case, comm, bodies, contact, timer, rigid)
+    _know_loads(contact, structure, rigid)
     scheme, fluid = build_coupled(case, comm, bodies, structure, timer, rigid)
     coupled = scheme.coupled
     watched = WatchedFlow(fluid)

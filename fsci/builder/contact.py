@@ -11,7 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
-from fsci.builder.held import is_held
+from fsci.builder.held import free_translations, is_held
 from fsci.builder.named import named
 from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.on_first import shared
@@ -25,12 +25,14 @@ from solvers.contact import law as laws
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
+from solvers.contact.unheld import Loose
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.topology import cut_out
 from solvers.structure.body import Body
 
 if TYPE_CHECKING:
     from solvers.rigid.field import RigidBodies
+    from solvers.structure.field import Structure
 
 
 def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodies | None = None) -> Contact:
@@ -40,23 +42,45 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: Rig
     return contact_of(case, comm, list(case.contact.pairs), pairs, comm.bcast(_unheld(case, bodies), root=0))
 
 
-def _unheld(case: Case, bodies: Sequence[Body]) -> list[list[int]]:
-    """Numbers of the pairs of each static body that only contact holds, on the first process."""
+def _unheld(case: Case, bodies: Sequence[Body]) -> list[Loose]:
+    """The static bodies that only contact holds, on the first process."""
     assert case.contact is not None
     assert case.structure is not None
     if case.structure.dynamics is not None:
         return []
-    loose = list(case.rigid or ())
+    sides = [[side.body or side.obstacle for _, side in pair.sides] for pair in case.contact.pairs.values()]
+    signs = [{two[0]: 1.0, two[1]: -1.0} if two[0] != two[1] else {} for two in sides]
+    ways = {
+        name: np.diag([float(axis not in body.held) for axis in "xyz"[: bodies[0].dim]])
+        for name, body in (case.rigid or {}).items()
+    }
     for body in bodies:
         if body.domain.source is not None and not is_held(case, body.name, body.domain.source):
-            loose.append(body.name)
-    sides = [{side.body or side.obstacle for _, side in pair.sides} for pair in case.contact.pairs.values()]
-    pairs = [[number for number, names in enumerate(sides) if name in names] for name in loose]
-    return [found for found in pairs if found]
+            ways[body.name] = free_translations(case, body.name, body.domain.source)
+    loose = [
+        Loose(name, {n: own[name] for n, own in enumerate(signs) if name in own}, free) for name, free in ways.items()
+    ]
+    return [body for body in loose if body.pairs]
+
+
+def know_loads(contact: Contact, structure: Structure, rigid: RigidBodies | None) -> None:
+    """Tell the contact the loads of the bodies that only it holds."""
+    names, dim = [body.name for body in contact.unheld.bodies], structure.dim
+
+    def loads() -> Array:
+        elastic = zip(structure.bodies, structure.split(structure.now.external), strict=True)
+        own = {body.name: load.reshape(-1, dim).sum(axis=0) for body, load in elastic}
+        found = structure.comm.allreduce(np.array([own.get(name, np.zeros(dim)) for name in names]))
+        for body, now in () if rigid is None else zip(rigid.bodies, rigid.now, strict=True):
+            if body.name in names:
+                found[names.index(body.name)] = now.load[:dim]
+        return found
+
+    contact.unheld.loads = loads
 
 
 def contact_of(
-    case: Case, comm: MPI.Comm, names: Sequence[str], pairs: Sequence[Pair], unheld: Sequence[Sequence[int]] = ()
+    case: Case, comm: MPI.Comm, names: Sequence[str], pairs: Sequence[Pair], unheld: Sequence[Loose] = ()
 ) -> Contact:
     """Contact of pairs with the settings of a case."""
     assert case.structure is not None

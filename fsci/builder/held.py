@@ -47,6 +47,18 @@ def is_held(case: Case, name: str, mesh: Mesh) -> bool:
     return _sprung(case, name) or not _held(case, name, mesh)[1]
 
 
+def free_translations(case: Case, name: str, mesh: Mesh) -> Array:
+    """Projection onto the translations of the centre in the motions that supports and springs leave, (dim, dim)."""
+    dim = mesh.points.shape[1]
+    matrix, free = _held(case, name, mesh)
+    if len(matrix) == 0:
+        return np.eye(dim)
+    motions = np.linalg.svd(matrix)[2][matrix.shape[1] - free :, :dim]
+    along, sizes, _ = np.linalg.svd(motions.T, full_matrices=False)
+    kept = along[:, sizes > UNHELD]
+    return kept @ kept.T
+
+
 def _held(case: Case, name: str, mesh: Mesh) -> tuple[Array, int]:
     """(conditions of supports and springs on rigid motions, as in `_conditions`; count of motions that are free)."""
     dim, extent = mesh.points.shape[1], float(np.ptp(mesh.points, axis=0).max())

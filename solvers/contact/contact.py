@@ -15,22 +15,20 @@ from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
-from solvers.contact.directions import free_normals
 from solvers.contact.force import force_matrix, nodal_force
-from solvers.contact.integration import Integration
+from solvers.contact.integration import Integrals, Integration
 from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.friction import FrictionBound, reversing
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses
-from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
 from solvers.contact.no_gap import NoGap
 from solvers.contact.pair import Pair
-from solvers.contact.reach import Reach
+from solvers.contact.reach import Reach, multiplier_dofs, touching_dofs
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
-from solvers.contact.unheld import nearest_gaps, slips_freely, untouched
+from solvers.contact.unheld import Falling, Loose, Unheld
 from solvers.contact.violation import rounding, violation
 from solvers.contact.work import FrictionWork, GivenWork, along_surface
 
@@ -44,7 +42,7 @@ class Contact:
     where a slave slides onto a master: a node enters the master before its area is covered. If one step closed this
     overlap, it would accelerate the node. If it stays, contact does no work. The first step closes all overlaps.
     periods: lengths [m] after which space repeats, infinite where it does not, shape (dim,); None: nowhere.
-    unheld: numbers of the pairs of each static body that only contact holds; see `unheld`.
+    unheld: the static bodies that only contact holds; see `unheld`.
     """
 
     def __init__(
@@ -55,7 +53,7 @@ class Contact:
         c_n: float = 1.0,
         keep_overlap: bool = False,
         periods: Array | None = None,
-        unheld: Sequence[Sequence[int]] = (),
+        unheld: Sequence[Loose] = (),
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.c_n = c_n
@@ -83,9 +81,9 @@ class Contact:
         self._stiffnesses = ContactStiffness(self.interface, np.zeros_like(self.x))
         self._no_gap = NoGap.among(self.nodes.points)
         self._tolerance = np.full(count, self._no_gap.others)  # gap that counts as closed, at the latest evaluation [m]
-        self._unheld = tuple(unheld)
+        self.unheld = Unheld(unheld)
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
-        self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
+        self._tied = self.interface.spans == "space"
         self._integration = Integration(self.interface, comm)
         self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
@@ -98,6 +96,7 @@ class Contact:
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
+        self._integrals: Integrals | None = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)  # before redistribution; of the last iterate
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
         self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
@@ -178,10 +177,7 @@ class Contact:
         self._integration.move(x - self.x)
         self.x, self.time = x, t
         self._integration.interfere(t)
-        if self.active_set.first and self._unheld:
-            alone = untouched(self._unheld, self.terms, self.active_set.active)
-            self._integration.look_farther(alone, x, self.x_old, self._constraints.coverage.enough)
-        if self._integration.clear:
+        if self._integration.clear and not self.unheld.bodies:
             return
         self._choose()
         if not self.active_set.changed and self._integration.rims.press(self.active_set.active):
@@ -190,21 +186,38 @@ class Contact:
 
     def _choose(self) -> None:
         """Integrate at the present positions, and choose the active set."""
-        self.terms = self._integrate()
-        status = np.full(len(self.z), OPEN, dtype=np.int8)
-        self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self._own_gap(self.terms))
-        self._mean_gap = np.zeros(len(self.z))
-        if self.terms is not None:
-            self._D = self._redistributed(self.terms.D)
+        status, falling = self._statuses()
+        if self._integration.look_farther(falling, self.x, self._constraints.coverage.enough):
+            status, _ = self._statuses()
+        self.active_set.choose(status)
+
+    def _statuses(self) -> tuple[Statuses, list[Falling]]:
+        """Statuses at the present positions, and the groups of bodies that contact alone would hold; see `unheld`."""
+        self.terms = terms = self._integrate()
+        self._mean_gap, status = np.zeros(len(self.z)), np.full(len(self.z), OPEN, dtype=np.int8)
+        self._gap = np.zeros(len(self.z)) if terms is None else self._redistributed(self._own_gap(terms))
+        if terms is not None:
+            self._D = self._redistributed(terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             self._tolerance = self._no_gap.at(self.active_set.tried)
-            if self._unheld and self.active_set.first:
-                areas = self.terms.D_of_pair * self._covers
-                self._tolerance += nearest_gaps(self._unheld, areas, self._mean_gap, self.active_set.active)
-            for law, which in self.interface.laws:
-                status[which] = law.status(self.point(which))
-            self._drop_dependent(status)
-        self.active_set.choose(status)
+            status = self._by_laws()
+        if not self.unheld.bodies:
+            return status, []
+        mask, gap, first, none = self._covers, self._mean_gap, self.active_set.first, self._no_gap.others
+        tries, falling = self.unheld.tries(terms, mask, gap, status, self.z.any(axis=1), first=first, none=none)
+        if tries.any() and self._integrals is not None:
+            self._tolerance = self._tolerance + tries
+            self.slip = self._integration.slip(self.x, self._integrals.with_fixed_normals(), self._shared)
+            status = self._by_laws()
+        return status, falling
+
+    def _by_laws(self) -> Statuses:
+        assert self.terms is not None
+        status = np.full(len(self.z), OPEN, dtype=np.int8)
+        for law, which in self.interface.laws:
+            status[which] = law.status(self.point(which))
+        status[self._constraints.dependent(self._spans, self.terms.normals, status != OPEN)] = OPEN
+        return status
 
     @property
     def _constrained(self) -> NDArray[np.bool_]:
@@ -218,7 +231,7 @@ class Contact:
 
     def _integrate(self) -> Terms | None:
         """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""
-        found = self._integration.integrate(self.x, self.x_old, self.z)
+        found = self._integrals = self._integration.integrate(self.x, self.x_old, self.z)
         if found is None:
             return None
         constrained = self._constraints.choose(found.terms)
@@ -243,20 +256,11 @@ class Contact:
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
             shares=np.zeros((len(which), len(self.pairs))) if slip is None else slip.shares[which],
             stuck=self.active_set.stuck[which],
-            free=slips_freely(self._unheld, self.terms.D_of_pair, self._covers, self.active_set.status)[which],
+            free=self.unheld.slips_freely(self.terms.D_of_pair, self._covers, self.active_set.status)[which],
             c_n=self.c_n * stiffness,
             c_t=self.c_n * stiffness,
             touching=self._tolerance[which],
         )
-
-    def _drop_dependent(self, status: Statuses) -> None:
-        """Open later multipliers of a node whose normals depend linearly on those of earlier ones."""
-        assert self.terms is not None
-        several = np.flatnonzero((status != OPEN) & ~self.multipliers.only_one & (self._spans == "normal"))
-        if len(several) == 0:
-            return
-        left = free_normals(self.terms.normals[several], self.multipliers.node[several], self.nodes.held)
-        status[several[~left.any(axis=1)]] = OPEN
 
     def _set_multipliers(self, own: Array) -> None:
         self.z[:] = own if self._shared is None else own + self._shared @ own
@@ -358,15 +362,11 @@ class Contact:
 
     def touching_dofs(self) -> NDArray[np.int64]:
         """Global dofs of the nodes of surfaces of present pairs that are not tied, each once."""
-        pairs = [pair for pair, present in zip(self.pairs, self.present, strict=True) if present and pair.law != Tied()]
-        dofs = self.nodes.dofs[self.interface.mask([side for pair in pairs for side in (pair.slave, pair.master)])]
-        return dofs[dofs >= 0]
+        return touching_dofs(self.interface, self.present)
 
     def multiplier_dofs(self) -> NDArray[np.int64]:
         """Global dofs of slave nodes of present pairs that are not tied."""
-        near = self.interface.mask([pair.slave for pair, here in zip(self.pairs, self.present, strict=True) if here])
-        slaves = (self.multipliers.areas > 0.0) & ~self._tied & near[self.multipliers.node]
-        return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
+        return multiplier_dofs(self.interface, self.present)
 
     @cached_property
     def _reach(self) -> Reach:

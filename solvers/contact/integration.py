@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -22,7 +22,7 @@ from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Normals, Terms, find_normals, total_terms
 from solvers.contact.ties import Ties
-from solvers.contact.unheld import look_farther
+from solvers.contact.unheld import Falling, look_farther
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,10 @@ class Integrals:
     terms: Terms
     normals: Normals
     used: tuple[tuple[Mortar, NDArray[np.int32]], ...]  #: facet pairs of each mortar that contributed
+
+    def with_fixed_normals(self) -> Integrals:
+        """The same, whose slips do not depend on the turning of normals: far away it would be a lever."""
+        return replace(self, normals=self.normals.fixed())
 
 
 class Integration:
@@ -56,6 +60,7 @@ class Integration:
             patch for patch in self._multipliers.patches if any(mortar.patch is patch for mortar in self._mortars)
         ]
         self.rims = Rims(self._multipliers, interface.nodes.points, pressed)
+        self._x_old = interface.nodes.points  # positions at the start of the step [m]
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
@@ -95,20 +100,16 @@ class Integration:
         for mortar in self._mortars:
             mortar.clear_until = -np.inf
 
-    def look_farther(
-        self, alone: Sequence[Sequence[int]], x: Array, x_old: Array, enough: Callable[[Array], NDArray[np.bool_]]
-    ) -> None:
-        """Let bodies find in this solve what is far away; arguments as of `unheld.look_farther`.
-
-        alone: numbers of the pairs of each of them.
-        """
-        for mortar in self._mortars:
-            mortar.farther = 0.0
-        for pairs in alone:
-            mine = [mortar for mortar in self._mortars if np.isin(mortar.masters.pair, pairs).any()]
-            if mine:
-                look_farther(mine, self._multipliers, x, x_old, enough)
-        self.search_anew()
+    def look_farther(self, groups: Sequence[Falling], x: Array, enough: Callable[[Array], NDArray[np.bool_]]) -> bool:
+        """Let groups of bodies find what is far away in this step; whether one does; see `unheld.look_farther`."""
+        found = False
+        for group in groups:
+            mine = [mortar for mortar in self._mortars if np.isin(mortar.masters.pair, list(group[0])).any()]
+            found |= bool(mine) and look_farther(mine, self._multipliers, x, self._x_old, group, enough)
+        if found:
+            self.search_anew()
+            self._sliding.begin_farther(self._x_old, self._travel)
+        return found
 
     def begin_step(self, x: Array, before: Array, active: NDArray[np.bool_], cycled: NDArray[np.bool_]) -> None:
         """Begin a step at the positions x [m], before: those at the beginning of the last one, (N, dim); masks, (C,).
@@ -116,6 +117,7 @@ class Integration:
         active: of the multipliers in contact; cycled: of those by which the step failed that is taken again.
         """
         self.shares.begin_step()
+        self._x_old = x
         for mortar in self._mortars:
             mortar.begin_step(x, active)
         if self.slides:

@@ -130,7 +130,7 @@ class Mortar:
         self._deep = np.empty(0, dtype=np.int64) if deep is None else np.unique(self._codes(deep))
         self._first: list[Array] = []  # positions [m] of both sides at the start, if facets are deep there
         self.interference = 0.0  #: largest overlap [m] that a pair asks for at present
-        self.farther = 0.0  #: by which the reach is larger in this solve [m], see `unheld`
+        self.farther = 0.0  #: by which the reach is larger in this step [m], see `unheld`
         self.clear_until = -np.inf  #: travel [m], see `near`, up to which no facets can be near
 
     def start(self, x: Array) -> None:
@@ -146,7 +146,7 @@ class Mortar:
 
         x: positions [m] of all nodes, (N, dim); active: mask of the multipliers in contact, (C,).
         """
-        self._evaluations = 0
+        self._evaluations, self.farther = 0, 0.0
         self._place_images(x)
         sides = (self.patch.nodes, self.masters.nodes)
         same = all(np.array_equal(x[nodes], first) for nodes, first in zip(sides, self._first, strict=False))
@@ -262,11 +262,15 @@ class Mortar:
         return derivative + _widen(through, columns) if len(through.data) else derivative
 
     def begin(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> tuple[Array, Sparse, Sparse]:
-        """(D, W, M) at the beginning of a step, for the slip. Facets contribute up to a distance of one edge."""
+        """(D, W, M) at the beginning of a step, for the slip, of facets up to one edge, or as `farther` says."""
         slave, master = self.patch.nodes, self.masters.nodes
-        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
+        result = self._at_beginning(x, normals, facet_pairs)
         W = sparse(result.W, (len(slave), len(slave))) @ self.patch.basis()[1]
         return result.D, W, sparse(result.M, (len(slave), len(master)))
+
+    def _at_beginning(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> MortarResult:
+        reach = self._reach(self.edge + self.farther)
+        return self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **reach)
 
     def covered(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> Array:
         """int N~_k where masters cover the slave at the beginning of a step [m^(dim-1)]; none is negative.
@@ -274,7 +278,7 @@ class Mortar:
         The dual functions have the sum 1, so that these are sums of int Phi_j N~_k.
         """
         slave = self.patch.nodes
-        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
+        result = self._at_beginning(x, normals, facet_pairs)
         return sparse(result.W, (len(slave), len(slave))).T @ np.ones(len(slave))
 
     def areas(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32], motion: float) -> Array:

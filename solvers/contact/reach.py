@@ -129,3 +129,18 @@ def _index(interface: ContactInterface, surface: Surface) -> int:
 
 def _mean_edge(points: Array, facets: NDArray[np.int64]) -> float:
     return float(np.linalg.norm(points[facets[:, 1]] - points[facets[:, 0]], axis=1).mean()) if len(facets) else 0.0
+
+
+def touching_dofs(interface: ContactInterface, present: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Global dofs of the nodes of surfaces of present pairs that are not tied, each once."""
+    pairs = [pair for pair, here in zip(interface.pairs, present, strict=True) if here and pair.law != Tied()]
+    dofs = interface.nodes.dofs[interface.mask([side for pair in pairs for side in (pair.slave, pair.master)])]
+    return dofs[dofs >= 0]
+
+
+def multiplier_dofs(interface: ContactInterface, present: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Global dofs of slave nodes of present pairs that are not tied."""
+    multipliers = interface.multipliers
+    near = interface.mask([pair.slave for pair, here in zip(interface.pairs, present, strict=True) if here])
+    slaves = (multipliers.areas > 0.0) & (interface.spans != "space") & near[multipliers.node]
+    return interface.nodes.dofs[np.unique(multipliers.node[slaves])].ravel()

@@ -101,6 +101,10 @@ class Sliding:
         share = np.divide(gap, gap - after, out=np.zeros_like(gap), where=approach)
         self._beginning = here.towards(there, np.minimum(share, 1.0))
 
+    def begin_farther(self, x: Array, travel: float) -> None:
+        """The same with a larger reach of some mortars; x: positions at the beginning of this step [m], (N, dim)."""
+        self._beginning = self._integrals(x, travel)
+
     def _integrals(self, x: Array, travel: float) -> Beginning:
         """Those at the positions x [m], (N, dim)."""
         (N, dim, pairs), C = self._shape, self._count

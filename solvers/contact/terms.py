@@ -28,6 +28,11 @@ class Normals:
         """Normals and derivatives of a patch."""
         return self.of_patch[next(k for k, other in enumerate(multipliers.patches) if other is patch)]
 
+    def fixed(self) -> Normals:
+        """The same without derivatives."""
+        of_patch = tuple((values, nothing(slopes.shape)) for values, slopes in self.of_patch)
+        return Normals(self.values, nothing(self.slopes.shape), of_patch)
+
 
 @dataclass(frozen=True)
 class Terms:

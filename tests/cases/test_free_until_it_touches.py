@@ -1,11 +1,9 @@
 """Statics of a block that is pushed over a gap against a wall: its load, or words where it meets none."""
 
-import numpy as np
 import pytest
 from programs import fsci
 
 from fsci.running.history import read_history
-from solvers.contact.unheld import nearest_gaps
 
 CASE = """
 time: {step: 0.5, end: 1, retry: {halvings: 1}}
@@ -55,15 +53,6 @@ def test_on_two_processes(tmp_path):
     (tmp_path / "case.yaml").write_text(CASE)
     assert fsci("run", tmp_path, "-o", tmp_path / "out", processes=2).returncode == 0
     assert read_history(tmp_path / "out" / "history.csv")["contact.wall.x"] == pytest.approx([-50.0, -100.0], rel=1e-9)
-
-
-def test_the_nearest_node_of_each_body():
-    """Unless one is in contact; the pairs of a body count together."""
-    of_pair = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
-    gap, none = np.array([0.3, 0.2, 0.1, 0.5]), np.zeros(4, dtype=bool)
-    assert nearest_gaps([[0], [1]], of_pair, gap, none) == pytest.approx([0.2, 0.2, 0.1, 0.1])
-    assert nearest_gaps([[0, 1]], of_pair, gap, none) == pytest.approx([0.1] * 4)
-    assert nearest_gaps([[0, 1]], of_pair, gap, np.array([True, False, False, False])) == pytest.approx([0.0] * 4)
 
 
 def test_what_goes_away_has_no_place_and_is_told_what_helps(tmp_path):

@@ -6,7 +6,7 @@ from programs import fsci
 
 from fsci.running.history import read_history
 from solvers.contact.law.law import OPEN, SLIP, STICK
-from solvers.contact.unheld import slips_freely
+from solvers.contact.unheld import Loose, Unheld
 
 #: A block drags another one over a base; both joints slide at the same force (draw 300286 of `fsci stress`).
 STACK = """\
@@ -75,15 +75,24 @@ def test_a_stack_with_half_the_step_and_on_two_processes(tmp_path):
 
 def test_bodies_that_a_node_holds_do_not_slip_freely():
     """A chain of two loose bodies on a held one: pair 0 holds the first, pair 1 joins them, pair 2 the second alone."""
-    bodies, of_pair = [[0, 1], [1, 2]], np.eye(3)
+    unheld, of_pair = (
+        Unheld(
+            [
+                Loose("first", {0: 1.0, 1: -1.0}, np.eye(2)),
+                Loose("second", {1: 1.0, 2: -1.0}, np.eye(2)),
+            ]
+        ),
+        np.eye(3),
+    )
 
     def found(*status):
-        return slips_freely(bodies, of_pair, np.ones(3, dtype=bool), np.array(status, dtype=np.int8)).tolist()
+        return unheld.slips_freely(of_pair, np.ones(3, dtype=bool), np.array(status, dtype=np.int8)).tolist()
 
     assert found(STICK, STICK, SLIP) == [False, False, False]
     assert found(STICK, SLIP, SLIP) == [False, True, True]
     assert found(SLIP, STICK, SLIP) == [True, False, True]
     assert found(SLIP, SLIP, OPEN) == [True, True, False]
     assert found(OPEN, SLIP, STICK) == [False, True, False]
-    assert slips_freely([], of_pair, np.ones(3, dtype=bool), np.full(3, SLIP)).tolist() == [False] * 3
-    assert slips_freely(bodies, of_pair, np.zeros(3, dtype=bool), np.full(3, SLIP)).tolist() == [False] * 3
+    slipping = np.full(3, SLIP)
+    assert Unheld([]).slips_freely(of_pair, np.ones(3, dtype=bool), slipping).tolist() == [False] * 3
+    assert unheld.slips_freely(of_pair, np.zeros(3, dtype=bool), slipping).tolist() == [False] * 3
