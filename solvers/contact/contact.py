@@ -13,14 +13,15 @@ from solvers.algebra.rows import RowTransformation
 from solvers.algebra.sparse import Sparse, nothing
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
+from solvers.contact.components import components_of
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
-from solvers.contact.directions import free_normals
+from solvers.contact.directions import dependent
 from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.friction import FrictionBound, reversing
-from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses
+from solvers.contact.law.law import OPEN, STICK, Point, Slopes
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
 from solvers.contact.no_gap import NoGap
@@ -70,6 +71,7 @@ class Contact:
         self.x_old = self.x.copy()
         self.active_set = ActiveSet(count)
         self._spans = self.interface.spans  # at the latest evaluation
+        self._pieces = np.where(self.nodes.dofs[:, 0] < 0, -1, 0)
         self._keep_overlap = keep_overlap
         self._begun = False  # a step that has not ended
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
@@ -113,6 +115,10 @@ class Contact:
         self._integration.interfere(t)
         self._interference = self._integration.interference  # what it takes to make it is energy of the start
         self._constraints.start(self.x)
+
+    def take_pieces(self, pieces: NDArray[np.int64]) -> None:
+        """Set the piece of a body that each node belongs to, -1 where rigid, shape (N,)."""
+        self._pieces = pieces
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -203,7 +209,9 @@ class Contact:
                 self._tolerance += nearest_gaps(self._unheld, areas, self._mean_gap, self.active_set.active)
             for law, which in self.interface.laws:
                 status[which] = law.status(self.point(which))
-            self._drop_dependent(status)
+            several = (status != OPEN) & ~self.multipliers.only_one & (self._spans == "normal")
+            status[dependent(self.terms.normals, self.multipliers.node, self.nodes.held, several)] = OPEN
+        self.active_set.take_components(components_of(self._pieces, *self.linked())[self.multipliers.node])
         self.active_set.choose(status)
 
     @property
@@ -213,8 +221,7 @@ class Contact:
 
     def _own_gap(self, terms: Terms) -> Array:
         """Weighted gaps of all multipliers [m^dim], less the interference of their pairs."""
-        interference = self._integration.interference
-        return terms.gap - interference @ terms.D_of_pair if interference.any() else terms.gap
+        return terms.gap - self._integration.interference @ terms.D_of_pair
 
     def _integrate(self) -> Terms | None:
         """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""
@@ -248,15 +255,6 @@ class Contact:
             c_t=self.c_n * stiffness,
             touching=self._tolerance[which],
         )
-
-    def _drop_dependent(self, status: Statuses) -> None:
-        """Open later multipliers of a node whose normals depend linearly on those of earlier ones."""
-        assert self.terms is not None
-        several = np.flatnonzero((status != OPEN) & ~self.multipliers.only_one & (self._spans == "normal"))
-        if len(several) == 0:
-            return
-        left = free_normals(self.terms.normals[several], self.multipliers.node[several], self.nodes.held)
-        status[several[~left.any(axis=1)]] = OPEN
 
     def _set_multipliers(self, own: Array) -> None:
         self.z[:] = own if self._shared is None else own + self._shared @ own
@@ -407,7 +405,7 @@ class Contact:
 
         The residual covers all conditions. If it is small and sets recur, their nodes have neither pressure nor gap.
         """
-        return not self.active_set.changed or bool(self.cycle())
+        return self.active_set.settled
 
     def cycle(self) -> str:
         """What cycles, for messages; empty if no earlier active set has come back."""
