@@ -59,18 +59,6 @@ class Constraints:
         shared = self._redistribution.shares((terms.D != 0.0) & ~able, covers, into)
         return Constrained(terms, covers, merged, self._interface.spans_among(covers), shared)
 
-    def dependent(self, spans: NDArray[np.str_], normals: Array, active: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Numbers of later multipliers of a node whose normals depend linearly on those of earlier ones.
-
-        spans, normals: admissible directions, shapes (C,) and (C, dim); active: mask of those in contact, (C,).
-        """
-        multipliers = self._interface.multipliers
-        several = np.flatnonzero(active & ~multipliers.only_one & (spans == "normal"))
-        if len(several) == 0:
-            return several
-        left = free_normals(normals[several], multipliers.node[several], self._interface.nodes.held)
-        return several[~left.any(axis=1)]
-
 
 def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
     """Mask of the blocked multipliers for nodes at x [m], shape (C,). It is found once, at the start of a run.

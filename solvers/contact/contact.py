@@ -13,8 +13,10 @@ from solvers.algebra.rows import RowTransformation
 from solvers.algebra.sparse import Sparse, nothing
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
+from solvers.contact.components import components_of
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
+from solvers.contact.directions import dependent
 from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.integration import Integrals, Integration
 from solvers.contact.interface import ContactInterface, describe_interface
@@ -68,6 +70,7 @@ class Contact:
         self.x_old = self.x.copy()
         self.active_set = ActiveSet(count)
         self._spans = self.interface.spans  # at the latest evaluation
+        self._pieces = np.where(self.nodes.dofs[:, 0] < 0, -1, 0)
         self._keep_overlap = keep_overlap
         self._begun = False  # a step that has not ended
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
@@ -112,6 +115,10 @@ class Contact:
         self._integration.interfere(t)
         self._interference = self._integration.interference  # what it takes to make it is energy of the start
         self._constraints.start(self.x)
+
+    def take_pieces(self, pieces: NDArray[np.int64]) -> None:
+        """Set the piece of a body that each node belongs to, -1 where rigid, shape (N,)."""
+        self._pieces = pieces
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -189,14 +196,16 @@ class Contact:
         status, falling = self._statuses()
         if self._integration.look_farther(falling, self.x, self._constraints.coverage.enough):
             status, _ = self._statuses()
+        self.active_set.take_components(components_of(self._pieces, *self.linked())[self.multipliers.node])
         self.active_set.choose(status)
 
     def _statuses(self) -> tuple[Statuses, list[Falling]]:
         """Statuses at the present positions, and the groups of bodies that contact alone would hold; see `unheld`."""
         self.terms = terms = self._integrate()
         self._mean_gap, status = np.zeros(len(self.z)), np.full(len(self.z), OPEN, dtype=np.int8)
-        self._gap = np.zeros(len(self.z)) if terms is None else self._redistributed(self._own_gap(terms))
+        self._gap = np.zeros(len(self.z))
         if terms is not None:
+            self._gap = self._redistributed(terms.gap - self._integration.interference @ terms.D_of_pair)
             self._D = self._redistributed(terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             self._tolerance = self._no_gap.at(self.active_set.tried)
@@ -216,18 +225,14 @@ class Contact:
         status = np.full(len(self.z), OPEN, dtype=np.int8)
         for law, which in self.interface.laws:
             status[which] = law.status(self.point(which))
-        status[self._constraints.dependent(self._spans, self.terms.normals, status != OPEN)] = OPEN
+        several = (status != OPEN) & ~self.multipliers.only_one & (self._spans == "normal")
+        status[dependent(self.terms.normals, self.multipliers.node, self.nodes.held, several)] = OPEN
         return status
 
     @property
     def _constrained(self) -> NDArray[np.bool_]:
         """Mask of the multipliers with a constraint at the latest evaluation, shape (C,)."""
         return self._covers if self.terms is not None else np.zeros(len(self.z), dtype=bool)
-
-    def _own_gap(self, terms: Terms) -> Array:
-        """Weighted gaps of all multipliers [m^dim], less the interference of their pairs."""
-        interference = self._integration.interference
-        return terms.gap - interference @ terms.D_of_pair if interference.any() else terms.gap
 
     def _integrate(self) -> Terms | None:
         """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""
@@ -289,7 +294,7 @@ class Contact:
 
         Where this step eliminated the multipliers last.
         """
-        if not self.near or not self.active_set.active.any():
+        if self.terms is None or not self.active_set.active.any():
             return np.zeros((self.size, self.dim)), np.zeros(self.size)
         if self._condensation is None:
             self.condense(weight)
@@ -392,14 +397,9 @@ class Contact:
         return float(np.linalg.norm(self.z[~self._tied], axis=1).max(initial=0.0))
 
     @property
-    def near(self) -> bool:
-        """Whether the latest `evaluate` found facets near each other."""
-        return self.terms is not None
-
-    @property
     def acts(self) -> bool:
         """Whether multipliers are in contact, or of some that left it the traction is not yet zero."""
-        return self.near and bool(self.active_set.active.any() or self.z.any())
+        return self.terms is not None and bool(self.active_set.active.any() or self.z.any())
 
     @property
     def settled(self) -> bool:
@@ -407,7 +407,7 @@ class Contact:
 
         The residual covers all conditions. If it is small and sets recur, their nodes have neither pressure nor gap.
         """
-        return not self.active_set.changed or bool(self.cycle())
+        return self.active_set.settled
 
     def cycle(self) -> str:
         """What cycles, for messages; empty if no earlier active set has come back."""

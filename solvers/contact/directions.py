@@ -50,6 +50,17 @@ def free_normals(normals: Array, node: NDArray[np.int64], held: Array) -> Array:
     return left
 
 
+def dependent(normals: Array, node: NDArray[np.int64], held: Array, which: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Those of some multipliers whose normals depend linearly on those of earlier ones of their node.
+
+    which: mask of the multipliers, (C,); others as of `free_normals`.
+    """
+    several = np.flatnonzero(which)
+    if len(several) == 0:
+        return several
+    return several[~free_normals(normals[several], node[several], held).any(axis=1)]
+
+
 def _order_at_node(node: NDArray[np.int64]) -> NDArray[np.int64]:
     """Index of each multiplier among those of its node, shape (m,)."""
     order = np.argsort(node, kind="stable")

@@ -83,7 +83,7 @@ class Sliding:
         self._beginning: Beginning | None = None
 
     def begin_step(self, x: Array, before: Array, active: NDArray[np.bool_], travel: float) -> None:
-        """Integrals at the beginning of a step, at open nodes that approach where they will touch.
+        """Integrals at the beginning of a step, of open nodes that twice the last way closes where they will touch.
 
         They touch where they come if all nodes move on as in the step before: from the beginning of the step, the part
         of the slip before the contact would be of first order.
@@ -92,12 +92,13 @@ class Sliding:
         multipliers in contact, (C,); travel: see `Mortar.near`.
         """
         here = self._beginning = self._integrals(x, travel)
-        gap = here.gaps(x)
-        if not (~active & (gap > 0.0)).any() or np.array_equal(x, before):
+        gap, way = here.gaps(x), x - before
+        near = ~active & (gap > 0.0) & (here.gaps(x + 2.0 * way) <= 0.0)
+        if not near.any():
             return
-        there = self._integrals(2.0 * x - before, travel)
-        after = there.gaps(2.0 * x - before)
-        approach = ~active & (gap > 0.0) & (after < gap)
+        there = self._integrals(x + way, travel)
+        after = there.gaps(x + way)
+        approach = near & (after < gap)
         share = np.divide(gap, gap - after, out=np.zeros_like(gap), where=approach)
         self._beginning = here.towards(there, np.minimum(share, 1.0))
 

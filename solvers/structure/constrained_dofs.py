@@ -22,6 +22,7 @@ class ConstrainedDofs:
         #: piece of each node, 0 for rigid ones, shape (N,)
         self._pieces = self.at_nodes(pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
         self._moves = constraint.dofs()[:, 0] >= 0  # mask of the nodes that are not rigid
+        constraint.take_pieces(np.where(self._moves, self._pieces, -1))
 
     @property
     def near(self) -> bool:

@@ -87,6 +87,31 @@ def test_going_in_circles_is_reported():
     assert active_set.cycle() == "the active set cycles: 2 nodes change their status again and again"
 
 
+def test_a_component_cycles_whatever_others_do():
+    """Its set comes back while that of another one grows. A whole set that is new is settled where only it changed."""
+    active_set = ActiveSet(6)
+    active_set.take_components(np.array([0, 0, 3, 3, 3, 3]))
+    active_set.begin_step()
+    for grown, flips in ((0, 1), (1, 0), (2, 1)):
+        active_set.choose(np.array([1, flips, *(np.arange(4) < grown)], dtype=np.int8))
+    assert active_set.cycle() == "the active set cycles: 1 node changes its status again and again"
+    assert active_set.returned.tolist() == [False, True, False, False, False, False]
+    assert not active_set.settled
+    active_set.choose(np.array([1, 0, 1, 1, 0, 0], dtype=np.int8))
+    assert active_set.settled
+
+
+def test_slips_reverse_again_whatever_other_components_do():
+    active_set = ActiveSet(2)
+    active_set.take_components(np.array([0, 1]))
+    active_set.begin_step()
+    active_set.choose(np.full(2, STICK, dtype=np.int8))
+    for other in (STICK, SLIP):
+        active_set.choose(np.array([SLIP, other], dtype=np.int8))
+        active_set.begin_increment(np.array([True, False]))
+    assert active_set.stuck.tolist() == [False, True]
+
+
 @pytest.mark.parametrize(("second", "wedges"), [(STICK, True), (OPEN, False)])
 def test_nodes_that_stick_and_slip_in_turn(second, wedges):
     """Nodes that open in turn are no wedge."""

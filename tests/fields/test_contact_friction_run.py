@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from fsci.case import CaseError, load_case
 from fsci.running.history import read_history
 from fsci.running.run import FINISHED, run_case
+from solvers.contact.slip import Sliding
 
 #: Weight 10, mu = 0.1, pulled by 3: a = 2. The base is as stiff as the block.
 SLIDING = """\
@@ -244,3 +245,17 @@ def test_a_block_sticks_where_it_touches(tmp_path, step, order):
     history = read_history(tmp_path / "out" / "history.csv")
     assert history["contact.sticking"][-1] > 0
     assert history["bottom.x"][history["time"] > 0.34] == pytest.approx(0.02 / 3, rel=1e-6)
+
+
+def test_only_nodes_that_nearly_touch_are_integrated_where_they_will(tmp_path, monkeypatch):
+    """26.7 steps of 0.000375 m close the gap: twice the way of a step does at the beginnings of the last two."""
+    places, integrals = [], Sliding._integrals
+
+    def counted(self, x, travel):
+        places.append(x)
+        return integrals(self, x, travel)
+
+    monkeypatch.setattr(Sliding, "_integrals", counted)
+    (tmp_path / "case.yaml").write_text(OBLIQUE.format(step=0.0125, order=1).replace("end: 1", "end: 0.35"))
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
+    assert len(places) == 28 + 2

@@ -44,6 +44,18 @@ def test_line_searches_of_two_scenes(tmp_path, stiffness):
     assert both["iterations"] == pytest.approx(np.maximum(*(history["iterations"] for history in alone)))
 
 
+def test_a_set_that_cycles_beside_one_that_changes(tmp_path):
+    """The line search of a scene begins when its own set comes back. With that of all it did not converge."""
+    scenes = [Scene("a", [0.0, 0.0], 1e3), Scene("b", [7.0, 0.5], 5.445e5)]
+    on_a_corner(scenes[0], -0.5033854551936683, 2.5955084e-4)
+    on_a_corner(scenes[1], -0.5080574301534384, 1.8046887e-4)
+    both = computed(tmp_path / "both", case_of(scenes))
+    alone = [computed(tmp_path / scene.name, case_of([scene])) for scene in scenes]
+    for scene, history in zip(scenes, alone, strict=True):
+        assert difference(scene, history, both) < AGREE
+    assert both["iterations"] == pytest.approx(np.maximum(*(history["iterations"] for history in alone)))
+
+
 @pytest.mark.slow
 def test_two_scenes_on_two_processes(tmp_path):
     """Each of them as on one process; parts of bodies and pairs lie on both."""
