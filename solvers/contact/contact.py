@@ -152,7 +152,8 @@ class Contact:
             self.work.end_step(weight, *self._force_and_slip())
         self._of_obstacles.end_step(-self.force()[self._obstacles], (self.x - self.x_old)[self._obstacles])
         before, self._interference = self._interference, self._integration.interference
-        self._of_interference.end_step(self._normal_forces(), self._interference - before)
+        pressed = np.zeros(len(self.pairs)) if self.terms is None else self.terms.normal_forces(self.z)  # [N]
+        self._of_interference.end_step(pressed, self._interference - before)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
         self.slip = None
 
@@ -166,10 +167,6 @@ class Contact:
         """(work of moved obstacles and of growing interference since the start, by how much it may be wrong) [J]."""
         parts = self._of_obstacles, self._of_interference
         return np.array([sum(part.total for part in parts), sum(part.doubt for part in parts)])
-
-    def _normal_forces(self) -> Array:
-        """Integral of the pressure of each pair [N], shape (pairs,)."""
-        return np.zeros(len(self.pairs)) if self.terms is None else self.terms.normal_forces(self.z)
 
     def _force_and_slip(self) -> tuple[Array, Array]:
         """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
@@ -397,9 +394,14 @@ class Contact:
         return float(np.linalg.norm(self.z[~self._tied], axis=1).max(initial=0.0))
 
     @property
+    def near(self) -> bool:
+        """Whether the latest `evaluate` found facets near each other."""
+        return self.terms is not None
+
+    @property
     def acts(self) -> bool:
         """Whether multipliers are in contact, or of some that left it the traction is not yet zero."""
-        return self.terms is not None and bool(self.active_set.active.any() or self.z.any())
+        return self.near and bool(self.active_set.active.any() or self.z.any())
 
     @property
     def settled(self) -> bool:
