@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Literal
 
@@ -59,14 +60,15 @@ def disc(name: str, points: Array) -> ImmersedBody:
     return rigid_body(name, points, np.stack([count, np.roll(count, -1)], axis=1))
 
 
-def cylinder_grid(cells: int) -> Grid:
-    """The channel with this many cells along the diameter of the cylinder.
+def cylinder_grid(cells: int, place: Sequence[float] = (0.0, 0.0)) -> Grid:
+    """The channel with this many cells along the diameter of the cylinder, moved by parts of them.
 
     No plane of the grid touches the cylinder: there the pressure would be 1 % off.
     """
-    h, low, high = DIAMETER / cells, 0.1288, 0.2712
-    x = graded(0.0, LENGTH, (low, high), h, 1.08, 4 * h + 0.01)
-    return Grid((x, graded(0.0, HEIGHT, (low, high), h, 1.08, 2 * h)))
+    h = DIAMETER / cells
+    x, y = ((0.1288 + part * h, 0.2712 + part * h) for part in place)
+    along = graded(0.0, LENGTH, x, h, 1.08, 4 * h + 0.01)
+    return Grid((along, graded(0.0, HEIGHT, y, h, 1.08, 2 * h)))
 
 
 def cylinder(

@@ -15,15 +15,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-#: A body without and with edges: by its boundary layer; a narrow gap; one that ends at edges.
-Kind = Literal["smooth", "sharp", "film", "ends"]
+#: A body without edges, with some in the plane, in space: by its boundary layer; a narrow gap; one that ends at edges.
+Kind = Literal["smooth", "sharp", "sharp in space", "film", "ends"]
 Curve = Sequence[tuple[float, float]]  #: (cells, error [%]), by increasing cells
 Table = Mapping[tuple[str, str], Sequence[Curve]]  #: (kind, element) -> a curve for each scene
 
 PATH = Path(__file__).parent / "table.json"
 
 #: Power of the cells with which errors fall beyond the table: that of the elements; at edges the pressure is singular.
-ORDER = {"smooth": 2.0, "sharp": 1.0, "film": 2.0, "ends": 2.0}
+ORDER = {"smooth": 2.0, "sharp": 1.0, "sharp in space": 1.0, "film": 2.0, "ends": 2.0}
 #: Errors below this [%] are not told apart.
 LEAST_ERROR = 0.01
 

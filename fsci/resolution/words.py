@@ -80,7 +80,9 @@ def before_the_run(body: BodyCells, element: str, *, films: bool) -> Iterator[tu
 
 
 def _kind(body: BodyCells) -> Kind:
-    return "sharp" if body.sharp else "smooth"
+    if not body.sharp:
+        return "smooth"
+    return "sharp in space" if body.dim == 3 else "sharp"
 
 
 def _of_body(body: BodyCells, element: str) -> Resolved:

@@ -260,15 +260,15 @@ def simple(monkeypatch):
     """A table whose errors are 8 / n^2 with q1q1 and 0.01 with q2q1; of films 10 times as much, of ends 700."""
     rows = [
         {"kind": kind, "scene": "", "element": element, "cells": n, "across": 4 * n, "error [%]": factor * off}
-        for kind, factor in (("smooth", 1.0), ("sharp", 2.0), ("film", 10.0), ("ends", 700.0))
+        for kind, factor in (("smooth", 1.0), ("sharp", 2.0), ("sharp in space", 4.0), ("film", 10.0), ("ends", 700.0))
         for n in (1.0, 2.0, 4.0)
         for element, off in (("q1q1", 8.0 / n**2), ("q2q1", 0.01))
     ]
     monkeypatch.setattr("fsci.resolution.table.table", lambda by="cells": tables.curves(rows, by))
 
 
-def body(layer, *gap_list, sharp=False, share=1.0):
-    return BodyCells("ball", 4.0 * layer, layer, sharp, 2.0, share, gap_list)
+def body(layer, *gap_list, sharp=False, dim=2, share=1.0):
+    return BodyCells("ball", 4.0 * layer, layer, sharp, dim, 2.0, share, gap_list)
 
 
 def test_errors_lie_between_rows_and_fall_beyond_them(simple):
@@ -291,6 +291,9 @@ def test_words_of_a_body(simple):
     assert found.message == (
         "body 'ball': 4 cells in its boundary layer, 16 across it, with which forces were 0.5 % off in the benchmark"
     )
+    for sharp, dim, error in ((False, 3, 0.5), (True, 2, 1.0), (True, 3, 2.0)):
+        (found,) = resolved([body(4.0, sharp=sharp, dim=dim)], "q1q1")
+        assert found.error == pytest.approx(error)
     (found,) = resolved([body(math.inf)], "q2q1")
     assert found.message == (
         "body 'ball': no shear in its boundary layer, inf across it, "
@@ -350,6 +353,15 @@ def test_the_table_is_that_of_the_benchmark():
         kept = next(r for r in rows if all(r[k] == row[k] for k in ("kind", "scene", "element", "across")))
         assert row["cells"] == pytest.approx(kept["cells"], rel=1e-3)
         assert row["error [%]"] == pytest.approx(kept["error [%]"], rel=1e-2)
+
+
+@pytest.mark.parametrize(("element", "cells"), [("q1q1", 8), pytest.param("q2q1", 3, marks=pytest.mark.slow)])
+def test_a_plate_in_space(element, cells):
+    """On other grids than those of the table, its error is known to a factor of two."""
+    row = bench.plate_in_space(element, cells, [[0.0, 0.0], [0.5, 0.4]])
+    assert row["kind"] == "sharp in space"
+    ratio = tables.error("sharp in space", element, row["cells"]) / row["error [%]"]
+    assert 0.5 < ratio < 2.0
 
 
 def test_layers_have_more_cells_on_finer_grids():

@@ -26,6 +26,7 @@ class BodyCells:
     across: float  #: cells across its extent: the longer one of a rectangle, the middle one in space
     layer: float  #: cells in its boundary layer; infinite: no shear acts, nan: the flow is not known
     sharp: bool  #: it has edges
+    dim: int  #: of space
     facets: float  #: facets per cell, by their edge lengths
     share: float  #: of the force that does not act in narrow gaps, as far as a flow explains it
     gaps: tuple[GapCells, ...]

@@ -124,6 +124,7 @@ def shape_of(
         across=_across(scene, body),
         layer=np.nan,
         sharp=bool(scene.sharp[body]),
+        dim=corners.shape[2],
         facets=float(1.0 / (edge * per_length)),
         share=float(share[some[~narrow]].sum()),
         gaps=tuple(_gaps_of(scene, body, share, caused)),
