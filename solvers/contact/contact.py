@@ -89,6 +89,7 @@ class Contact:
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
         self._integration = Integration(self.interface, comm)
+        self._as_meshed = np.zeros(count)  # gaps of the meshes that are none [m]
         self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
@@ -112,6 +113,7 @@ class Contact:
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
         self._integration.start(self.x)
+        self._as_meshed = self._integration.as_meshed(self.nodes.points)
         self._integration.interfere(t)
         self._interference = self._integration.interference  # what it takes to make it is energy of the start
         self._constraints.start(self.x)
@@ -220,8 +222,8 @@ class Contact:
         return self._covers if self.terms is not None else np.zeros(len(self.z), dtype=bool)
 
     def _own_gap(self, terms: Terms) -> Array:
-        """Weighted gaps of all multipliers [m^dim], less the interference of their pairs."""
-        return terms.gap - self._integration.interference @ terms.D_of_pair
+        """Weighted gaps of all multipliers [m^dim], less the interference of their pairs and what facets leave."""
+        return terms.gap - self._integration.interference @ terms.D_of_pair - self._as_meshed * terms.D
 
     def _integrate(self) -> Terms | None:
         """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""

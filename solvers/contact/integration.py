@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from solvers.algebra.sparse import Sparse
 from solvers.api import Array
+from solvers.contact.as_meshed import gaps_as_meshed
 from solvers.contact.interface import ContactInterface
 from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.tied import Tied
@@ -75,6 +76,15 @@ class Integration:
         self.search_anew()
         for mortar in self._mortars:
             mortar.start(x)
+
+    def as_meshed(self, x: Array) -> Array:
+        """Gaps that are none, see `gaps_as_meshed`, (C,); x: places of the meshes [m], shape (N, dim)."""
+        none = np.zeros(len(self._multipliers.node))
+        if not any(pair.off_curve for pair in self._interface.pairs):
+            return none
+        found = self.integrate(x, x, np.zeros((len(none), x.shape[1])))
+        self.search_anew()
+        return none if found is None else gaps_as_meshed(self._interface.pairs, found.terms)
 
     def interfere(self, t: float) -> None:
         """Set the interference of the pairs at the time t [s]."""
