@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
+from fsci.builder.fits import off_curve
 from fsci.builder.held import free_translations, is_held
 from fsci.builder.named import named
 from fsci.builder.obstacle_motion import motion_of_obstacle
@@ -108,7 +109,8 @@ def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodie
         law = named(laws, settings.law)(*settings.law_parameters)
         deep = facets_in_each_other(case, comm, settings, meshes)
         overlap = settings.overlap if settings.interference is not None else None
-        one = Pair(sides[0], sides[1], settings.integration, law, deep, overlap, always=in_flow)
+        off = shared(comm, partial(off_curve, case, settings, known))
+        one = Pair(sides[0], sides[1], settings.integration, law, deep, overlap, off, always=in_flow)
         pairs.append(one.exchanged() if name in others else one)
     return pairs
 

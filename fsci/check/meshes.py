@@ -165,9 +165,10 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
         found.notes += list(alternating(case, found.meshes))
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in dry_facets(case, bodies)]
-        pair_at = partial(case.place, "contact", "pairs")  # of none that the program finds
-        found.notes += [f"{pair_at(name)}: {why}" for name, why in exchanged(case, found.meshes, found.pairs).items()]
-        found.warnings += [f"{pair_at(name)}: {text}" for name, text in faceted_fits(case, found.meshes, found.pairs)]
+        for name, why in exchanged(case, found.meshes, found.pairs).items():  # of none that the program finds
+            found.notes.append(f"{case.place('contact', 'pairs', name)}: {why}")
+        for name, text in faceted_fits(case, found.meshes, found.pairs):
+            found.warnings.append(f"{case.place('contact', 'pairs', name)}: {text}")
 
 
 def _own_laws(case: Case, found: Findings) -> None:

@@ -32,11 +32,11 @@ def is_curved(mesh: Mesh, names: Sequence[str] | None = None) -> bool:
     return bool((np.bincount(sides.ravel(), minlength=1) > 1).any())
 
 
-def facet_offset(mesh: Mesh, names: Sequence[str] | None = None) -> float:
-    """Mean distance [m] of straight facets of named surfaces, by default of all, from the smooth one they stand for.
+def facet_height(mesh: Mesh, names: Sequence[str] | None = None) -> float:
+    """Largest height [m] of the smooth surface over straight facets of named surfaces, by default of all.
 
-    Positive if it lies outside of the body. By the normals n at its ends the arc over an edge e has the height
-    (n_2 - n_1) . e / 8; parabolas of this height have two thirds of it in the mean, in 3D a third for each edge.
+    By the normals n at its ends the arc over an edge e has the height (n_2 - n_1) . e / 8; in 3D that of a facet is at
+    most the sum over its edges. Second-order cells have none.
     """
     if mesh.cells.size and CELL_TYPES[mesh.cell_type].degree > 1:
         return 0.0
@@ -47,11 +47,11 @@ def facet_offset(mesh: Mesh, names: Sequence[str] | None = None) -> float:
     sums = np.zeros((len(sides.nodes), x.shape[1]))
     np.add.at(sums, sides.facets, areas[:, None])
     normals = (sums / np.linalg.norm(sums, axis=1, keepdims=True))[sides.facets]
-    offset = np.zeros(len(simplices))
+    height = np.zeros(len(simplices))
     for first, second in [(0, 1)] if x.shape[1] == 2 else [(0, 1), (1, 2), (2, 0)]:
         turned, edge = normals[:, second] - normals[:, first], corners[:, second] - corners[:, first]
-        offset += np.einsum("md,md->m", turned, edge) / (12.0 if x.shape[1] == 2 else 24.0)
-    return float(np.average(offset, weights=np.linalg.norm(areas, axis=1)))
+        height += np.abs(np.einsum("md,md->m", turned, edge)) / 8.0
+    return float(height.max())
 
 
 def outward_edges(mesh: Mesh, names: Sequence[str] | None = None) -> NDArray[np.float64]:

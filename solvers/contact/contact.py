@@ -202,7 +202,7 @@ class Contact:
         self._mean_gap, status = np.zeros(len(self.z)), np.full(len(self.z), OPEN, dtype=np.int8)
         self._gap = np.zeros(len(self.z))
         if terms is not None:
-            self._gap = self._redistributed(terms.gap - self._integration.interference @ terms.D_of_pair)
+            self._gap = self._redistributed(self._integration.own_gap(terms))
             self._D = self._redistributed(terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             self._tolerance = self._no_gap.at(self.active_set.tried)

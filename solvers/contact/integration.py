@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from solvers.algebra.sparse import Sparse
 from solvers.api import Array
+from solvers.contact.as_meshed import gaps_as_meshed
 from solvers.contact.interface import ContactInterface
 from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.tied import Tied
@@ -64,6 +65,7 @@ class Integration:
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
+        self._as_meshed = np.zeros(len(self._multipliers.node))  # gaps of the meshes that are none [m]
 
     @property
     def slides(self) -> bool:
@@ -80,6 +82,16 @@ class Integration:
         self.search_anew()
         for mortar in self._mortars:
             mortar.start(x)
+        if any(pair.off_curve for pair in self._interface.pairs):
+            meshed = self._interface.nodes.points
+            found = self.integrate(meshed, meshed, np.zeros((len(self._as_meshed), meshed.shape[1])))
+            if found is not None:
+                self._as_meshed = gaps_as_meshed(self._interface.pairs, found.terms)
+            self.search_anew()
+
+    def own_gap(self, terms: Terms) -> Array:
+        """Weighted gaps of all multipliers [m^dim], less the interference of their pairs and `gaps_as_meshed`, (C,)."""
+        return terms.gap - self.interference @ terms.D_of_pair - self._as_meshed * terms.D
 
     def interfere(self, t: float) -> None:
         """Set the interference of the pairs at the time t [s]."""

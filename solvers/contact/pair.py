@@ -28,6 +28,7 @@ class Pair:
     #: facets (slave, master) in numbers of the surfaces that lie deep in each other's body at the start, shape (p, 2)
     deep: NDArray[np.int32] | None = None
     interference: Callable[[float], float] | None = None  #: time [s] -> overlap [m] of the bodies as meshed; None: zero
+    off_curve: float = 0.0  #: largest gap [m] of the meshes that is none, see `as_meshed`; 0: all of them are
     always: bool = False  #: present in all steps, so that its surfaces never have mass
     others: bool = False  #: its forces are given as those on the master
 
