@@ -62,9 +62,9 @@ class CompositeStart:
         for part in self._parts:
             part.end()
 
-    def take_impulse(self, step: Callable[[], float], jump: float) -> bool:
+    def take_impulse(self, step: Callable[[], float], *, always: bool) -> bool:
         """True: rigid bodies take their velocities, free elastic ones the rigid part of theirs. Momentum is kept."""
         dt = step()
-        self._rigid.take_impulse(lambda: dt, jump)
+        self._rigid.take_impulse(lambda: dt, always=always)
         self._elastic.share_impulse(dt)
         return True

@@ -67,12 +67,13 @@ class ElasticStart:
         now.a[apart] = initial.a[apart]
         self._structure.take_start(np.where(apart, initial.u, now.u - self.steps * (now.u - old.u)))
 
-    def take_impulse(self, step: Callable[[], float], jump: float) -> bool:
+    def take_impulse(self, step: Callable[[], float], *, always: bool) -> bool:
         """False: it acts on the surface, and waves that steps need not resolve carry it on.
 
         Backward Euler damps what deforms. It is for bodies without supports that move as rigid ones, until the impulse.
+        always: for others, too, since the step before may have another length, so that its acceleration counts wrongly.
         """
-        self.elastic.impulse = "next" if self._moves_freely() else "none"
+        self.elastic.impulse = "next" if always or self._moves_freely() else "none"
         return False
 
     def _moves_freely(self) -> bool:

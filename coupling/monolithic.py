@@ -30,7 +30,7 @@ from coupling.divided import lengths, step_in_parts
 from coupling.impact import Impact
 from coupling.ports import IterativeFlow
 from coupling.secant import Secant
-from coupling.start import start_again, start_together
+from coupling.start import start_again, start_at_jump, start_together
 from coupling.wall_passed import WallPassed
 from solvers.algebra import linear
 from solvers.algebra.connected import connected_parts
@@ -88,6 +88,17 @@ class Monolithic:
         """Set both parts to the first time t [s]; dt [s]: length of the first step."""
         self.coupled.initialise(t, dt, with_solid=True)
         start_together(self.coupled, t, dt, self._solve_unpredicted, roughly=self._solve_linearised, with_solid=True)
+
+    divides = True  #: steps where it starts
+
+    @property
+    def can_start(self) -> bool:
+        """Whether it can start in the middle of a run."""
+        return self.coupled.start is not None
+
+    def start_anew(self, t: float, dt: float) -> None:
+        """Prepare a step of length dt [s] from t, at which given velocities jump (collective)."""
+        start_at_jump(self.coupled, t, dt, self._solve_unpredicted, with_solid=True)
 
     def _begin_system(self) -> None:
         """Discard derivatives and preconditioners of the last step."""

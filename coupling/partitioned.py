@@ -18,7 +18,7 @@ from coupling.bracket import CouplingIterate, brackets, halved
 from coupling.coupled import Coupled, suction, with_cause
 from coupling.divided import lengths, step_in_parts
 from coupling.impact import Impact
-from coupling.start import start_again, start_together
+from coupling.start import start_again, start_at_jump, start_together
 from coupling.wall_passed import WallPassed
 from solvers.api import Array, FailureKind, State, StepFailed, StepInfo
 from solvers.counted import counted
@@ -57,6 +57,19 @@ class Partitioned:
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
         return step_in_parts(self._take, t, lengths(dt, self.coupled.longest_step))
+
+    divides = True  #: steps where it starts
+
+    @property
+    def can_start(self) -> bool:
+        """Whether it can start in the middle of a run."""
+        return self.coupled.start is not None
+
+    def start_anew(self, t: float, dt: float) -> None:
+        """Prepare a step of length dt [s] from t, at which given velocities jump (collective)."""
+        self.accelerator.forget()
+        start_at_jump(self.coupled, t, dt, self._iterate)
+        self.accelerator.forget()
 
     def _start_again(self, t: float, dt: float) -> None:
         """Start anew after the step of an impulse; increments of other steps say nothing of this start."""

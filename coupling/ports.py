@@ -387,11 +387,11 @@ class StartOfSolid(Protocol):
         """Begin a start after such a step."""
         ...
 
-    def take_impulse(self, step: Callable[[], float], jump: float) -> bool:
-        """Take the impulse of a start with this jump [m/s]; False: in the first steps of the run, True: at once.
+    def take_impulse(self, step: Callable[[], float], *, always: bool) -> bool:
+        """Take the impulse of a start; False: in the first steps of the run, True: at once.
 
         step: solves a start step of the length dt [s] that it returns. The solid then restores its displacement, and
-        adds the velocity a dt.
+        adds the velocity a dt. always: in the middle of a run.
         """
         ...
 

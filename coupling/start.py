@@ -67,7 +67,17 @@ def start_again(
     solid = coupled.start.solid
     solid.begin()
     if not _start(coupled, coupled.start, t, dt, solve, solve, with_solid=with_solid, jump=0.0):
-        solid.take_impulse(lambda: dt, math.inf)  # in one more step: its acceleration is that of the impulse still
+        solid.take_impulse(lambda: dt, always=False)  # in one more step: its acceleration is that of the impulse still
+
+
+def start_at_jump(
+    coupled: Coupled, t: float, dt: float, solve: Callable[[], object], *, with_solid: bool = False
+) -> None:
+    """Start anew at t [s], where given velocities jump, for a step of length dt [s] (collective)."""
+    assert coupled.start is not None
+    load = coupled.force()
+    coupled.start.flow.forget_earlier()
+    _start(coupled, coupled.start, t, dt, solve, solve, with_solid=with_solid, jump=math.inf, load=load)
 
 
 def _start(
@@ -80,10 +90,12 @@ def _start(
     *,
     with_solid: bool,
     jump: float,
+    load: Array | None = None,
 ) -> bool:
     """Start; False: a start step does not converge.
 
-    jump: velocity [m/s] of an impulsive start, zero: none; the others as in `start_together`.
+    jump: velocity [m/s] of an impulsive start, zero: none; load: on the vertices [N] without the impulse, None: no one;
+    the others as in `start_together`.
     """
     flow, solid, interface = start.flow, start.solid, coupled.interface
     velocity, initial = solid.velocity(), coupled.save()
@@ -91,11 +103,12 @@ def _start(
     solid.leave_out(coupled.flow.outside(surfaces))
     try:
         if jump > 0.0:
-            if not solid.take_impulse(partial(_impulse, coupled, start, t, dt, velocity, solve), jump):
+            step = partial(_impulse, coupled, start, t, dt, velocity, solve)
+            if not solid.take_impulse(step, always=load is not None):
                 return True
             flow.end_impulse(dt)
             interface.initialise()
-            coupled.solid.load(np.zeros_like(velocity))
+            coupled.solid.load(np.zeros_like(velocity) if load is None else load)
         elif flow.accelerates or solid.steps == 1:
             _share_acceleration(coupled, start, t, dt, velocity, solve, roughly)
         else:

@@ -191,6 +191,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.coupling import build_coupled, start
     from fsci.builder.dry_side import outlines
     from fsci.builder.flow_loads import loads_of_flow
+    from fsci.builder.jumps import at_jumps
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.flow.probes import Forces
@@ -224,7 +225,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         return of_structure(structure, _contact_fields(structure), loads) + of_fluid(fluid, forces) + dry
 
     return Simulation(
-        scheme=scheme,
+        scheme=at_jumps(case, scheme),
         initialise=partial(start, case, scheme, fluid),
         snapshots=snapshots,
         probes=joined(probes),
@@ -256,6 +257,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import fluid as build_fluid
     from fsci.builder import rigid as build_rigid
     from fsci.builder.coupling import build_coupled_rigid, start
+    from fsci.builder.jumps import at_jumps
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.flow.probes import Forces
@@ -270,7 +272,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         build_probes(case, "fluid", build_fluid.FLUID_PROBES, Forces(fluid)),
     ]
     return Simulation(
-        scheme=scheme,
+        scheme=at_jumps(case, scheme),
         initialise=partial(start, case, scheme, fluid),
         snapshots=lambda: snapshots(fluid),
         probes=joined(probes),
@@ -288,6 +290,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.fluid import FLUID_PROBES, build_fluid, build_rigid_bodies
+    from fsci.builder.jumps import at_jumps
     from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.flow.probes import Forces
     from solvers.fluid.flow.resolution.measure import measure
@@ -296,7 +299,7 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
     watched = WatchedFlow(fluid)
     return Simulation(
-        scheme=fluid,
+        scheme=at_jumps(case, fluid),
         initialise=fluid.initialise,
         snapshots=lambda: snapshots(fluid),
         probes=build_probes(case, "fluid", FLUID_PROBES, Forces(fluid)),

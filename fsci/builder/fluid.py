@@ -18,6 +18,7 @@ from fsci.case.flow_element import flow_element
 from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import finite, rigid_motion
+from fsci.case.velocity_jumps import velocity_jumps
 from fsci.meshes.nested import following, read_grid
 from fsci.meshes.of_case import read_rigid_body, require_shorter_than_period
 from solvers.api import StepFailed
@@ -136,7 +137,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
     if movement is None:
         require_shorter_than_period(case, ("fluid", "bodies", name), points)
         return rigid_body(name, points, facets)
-    moved = finite(rigid_motion(points, movement, case.time.start, case.time.step), name)
+    moved = finite(rigid_motion(points, movement, case.time.start, case.time.step, velocity_jumps(case)), name)
     require_shorter_than_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
     return rigid_body(name, points, facets, moved)
 

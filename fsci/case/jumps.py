@@ -23,17 +23,26 @@ HALVED = 48
 
 
 def find_jump(formula: Callable[[Array], Array], times: Array) -> tuple[float, float] | None:
-    """(time, size) of the largest jump of a function of time, sampled at these times; None if it is continuous.
+    """(time, size) of the largest jump of a function of time, sampled at these times; None if it is continuous."""
+    found = find_jumps(formula, times)
+    return max(found, key=lambda jump: abs(jump[1])) if found else None
+
+
+def find_jumps(
+    formula: Callable[[Array], Array], times: Array, halved: int = HALVED, noise: float = 0.0
+) -> list[tuple[float, float]]:
+    """(time, size) of the jumps of a function of time, at most one between two of the times at which it is sampled.
 
     Each interval is halved again and again, and the half with the larger change is kept. The change of a continuous
     function goes to zero: in the second half of the halvings it shrinks, if only by a half. That of a jump stays.
+    noise: size of values that are rounding errors.
     """
     begin, end = times[:-1].copy(), times[1:].copy()
     first, last = formula(begin), formula(end)
     earlier = np.abs(last - first)
     # where the numbers end, so do the halvings
-    possible = np.floor(np.log2((end - begin) / np.spacing(np.maximum(np.abs(begin), np.abs(end))))).clip(0, HALVED)
-    for count in range(HALVED):
+    possible = np.floor(np.log2((end - begin) / np.spacing(np.maximum(np.abs(begin), np.abs(end))))).clip(0, halved)
+    for count in range(halved):
         earlier = np.where(count == possible // 2, np.abs(last - first), earlier)
         middle = 0.5 * (begin + end)
         at = formula(middle)
@@ -43,12 +52,10 @@ def find_jump(formula: Callable[[Array], Array], times: Array) -> tuple[float, f
         end, last = np.where(on & left, middle, end), np.where(on & left, at, last)
     margin = 8.0 * np.spacing(np.maximum(np.abs(begin), np.abs(end)))  # the value between may be a third one
     change = formula(np.minimum(end + margin, times[-1])) - formula(np.maximum(begin - margin, times[0]))
-    noise = 1e3 * np.finfo(float).eps * np.abs(np.concatenate([first, last])).max()
-    jumps = np.flatnonzero((np.abs(change) > 0.5 * earlier) & (np.abs(change) > noise) & (possible >= 8))
-    if not len(jumps):
-        return None
-    largest = jumps[np.argmax(np.abs(change[jumps]))]
-    return float(end[largest]), float(change[largest])
+    size = float(np.abs(np.concatenate([first, last])).max())
+    noise = max(noise, 1e3 * float(np.finfo(float).eps) * size)
+    found = np.flatnonzero((np.abs(change) > 0.5 * earlier) & (np.abs(change) > noise) & (possible >= 8))
+    return [(float(end[k]), float(change[k])) for k in found]
 
 
 def jump_warnings(case: Case) -> Iterator[tuple[Keys, str]]:

@@ -19,7 +19,7 @@ LEAST_STEP = 0.1
 class Retry(Section):
     """The repetition of a failed step as two half steps."""
 
-    halvings: CountOrZero = setting(4, "how many times a step may be halved before the run ends")
+    halvings: CountOrZero = setting(8, "how many times a step may be halved before the run ends")
     recover_after: Count = setting(5, "accepted steps after which a halved step is doubled again")
 
 

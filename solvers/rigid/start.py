@@ -81,7 +81,7 @@ class RigidStart:
         field.now = [start if body.name in self._apart else replace(start, p=now.p) for body, start, now in parts]
         field.old = list(field.now)
 
-    def take_impulse(self, step: Callable[[], float], jump: float) -> bool:
+    def take_impulse(self, step: Callable[[], float], *, always: bool) -> bool:
         """True: the whole body has another velocity at once. Positions are restored."""
         dt, field = step(), self.field
         parts = zip(field.bodies, self._initial, field.now, field.old, field.increments(), strict=True)

@@ -150,27 +150,6 @@ def test_load_in_the_middle_of_a_run(tmp_path, scheme):
     assert found[-4:] == pytest.approx(0.2 / 2.25, rel=0.004)
 
 
-@pytest.mark.parametrize(
-    ("scheme", "swing"),
-    [
-        pytest.param("bdf2", 4, marks=pytest.mark.slow),
-        pytest.param("bdf2_optimized", 6, marks=pytest.mark.slow),
-        ("backward_euler", 2),
-    ],
-)
-def test_motion_that_jumps_in_the_middle_of_a_run(tmp_path, scheme, swing):
-    """The impulses of some steps swing; they add up to that of the added mass, and then there is no force."""
-    head, _ = CYLINDER.split("coupling:")
-    moved = """motion: {{displacement: ["where(t < 0.11, 0, 0.1 * (t - 0.11))", 0]}}"""
-    text = head.replace("free: {{density: 1, initial_velocity: [0.1, 0]}}", moved)
-    text = text.format(step=0.02, end=0.3, scheme=scheme, x=0.0)
-    text += "probes: {f: {body: cylinder, quantity: force}}\noutput: {fields_every: 0}\n"
-    impulses = -0.02 * speeds(tmp_path, text, "f.x") / (math.pi * 0.5**2 * 1.25 * 0.1)
-    assert impulses.sum() == pytest.approx(1.0, rel=0.005)
-    assert abs(impulses[:5]).max() < 1e-6
-    assert abs(impulses[5 + swing :]).max() < 0.02
-
-
 @pytest.mark.parametrize("step", [0.02, 0.005])
 def test_motion_that_starts_with_a_jump(tmp_path, step):
     """The impulse of the fluid on it is that of its added mass, and then there is no force."""

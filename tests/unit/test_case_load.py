@@ -43,7 +43,7 @@ def test_every_case_of_the_project_is_valid():
 
 def test_defaults(case_of):
     case = case_of(MINIMAL)
-    assert (case.title, case.time.start, case.time.retry.halvings) == ("", 0.0, 4)
+    assert (case.title, case.time.start, case.time.retry.halvings) == ("", 0.0, 8)
     assert case.structure.dynamics is None
     assert case.structure.bodies["block"].material.density is None
     assert (case.units.length, case.units.mass, case.units.time) == ("m", "kg", "s")

@@ -41,7 +41,7 @@ def test_lines_of_the_reference():
     assert "| `gravity` | list (2 or 3, expression of x, y, z, t) |  | m/s^2 | acceleration of gravity |" in lines
     assert "| `lambda` | expression of x, y, z |  | Pa | first Lame constant |" in lines
     assert (
-        "| `halvings` | whole number >= 0 | `4` |  | how many times a step may be halved before the run ends |" in lines
+        "| `halvings` | whole number >= 0 | `8` |  | how many times a step may be halved before the run ends |" in lines
     )
     assert "## `structure.bodies.NAME.mesh` with shape: `tube` or `annulus`" in lines
 

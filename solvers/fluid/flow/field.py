@@ -53,6 +53,7 @@ class Fluid(Smooth):
     """Implements `Field`: velocity and pressure on the cut grid, from step to step."""
 
     name = "fluid"
+    can_start, divides = True, False  #: in the middle of a run; its steps there
 
     def __init__(
         self,
@@ -173,6 +174,10 @@ class Fluid(Smooth):
         self.current = FlowStep(t, dt, self.history.difference(dt))
         if not self.moving.coupled:
             self.move({})
+
+    def start_anew(self, t: float, dt: float) -> None:
+        """Let the next steps count no velocity from before t, where given ones jump."""
+        self.history.forget_earlier()
 
     def step(self, t: float, dt: float) -> StepInfo:
         """One step from t to t + dt. Raises StepFailed."""
@@ -331,6 +336,7 @@ class Fluid(Smooth):
     def begin_start_step(self, t: float, short: float, difference: Difference) -> None:
         """Begin a short step [s] with positions and loads of t; velocities of the boundary are those at its end."""
         self.begin_step(t - short, short)
+        self._begin_system(replace(self.current, scale_alpha=None))  # that of other steps is not its own
         self.moving.sweep.forget()  # nothing moves
         self.on_cells.prescribe(t + short)
         self.current = FlowStep(t, short, difference)
