@@ -42,6 +42,11 @@ class Beginning:
         weighted = -np.einsum("nd,nd->n", self.difference @ x + self.offset, self.normals)
         return np.divide(weighted, self.D, out=np.full_like(self.D, np.nan), where=self.D > 0.0)
 
+    def ways(self, way: Array) -> Array:
+        """By how much the gaps change at most if the nodes move by these ways [m], whatever turns, shape (C,)."""
+        sizes = replace(self.difference, data=np.abs(self.difference.data)) @ np.linalg.norm(way, axis=1)
+        return np.divide(sizes, self.D, out=np.zeros_like(self.D), where=self.D > 0.0)
+
     def towards(self, later: Beginning, share: Array) -> Beginning:
         """Linear interpolation of the integrals over D; share: of the later ones by multiplier, shape (C,)."""
         own, other = 1.0 - share, np.divide(share * self.D, later.D, out=np.zeros_like(share), where=share > 0.0)
@@ -83,7 +88,7 @@ class Sliding:
         self._beginning: Beginning | None = None
 
     def begin_step(self, x: Array, before: Array, active: NDArray[np.bool_], travel: float) -> None:
-        """Integrals at the beginning of a step, of open nodes that twice the last way closes where they will touch.
+        """Integrals at the beginning of a step, of open nodes that twice the last way could close where they touch.
 
         They touch where they come if all nodes move on as in the step before: from the beginning of the step, the part
         of the slip before the contact would be of first order.
@@ -93,7 +98,7 @@ class Sliding:
         """
         here = self._beginning = self._integrals(x, travel)
         gap, way = here.gaps(x), x - before
-        near = ~active & (gap > 0.0) & (here.gaps(x + 2.0 * way) <= 0.0)
+        near = ~active & (gap > 0.0) & (gap <= 2.0 * here.ways(way))
         if not near.any():
             return
         there = self._integrals(x + way, travel)

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 from fsci.case import CaseError, load_case
 from fsci.running.history import read_history
 from fsci.running.run import FINISHED, run_case
-from solvers.contact.slip import Sliding
+from solvers.algebra.sparse import sparse_from_array
+from solvers.contact.slip import Beginning, Sliding
 
 #: Weight 10, mu = 0.1, pulled by 3: a = 2. The base is as stiff as the block.
 SLIDING = """\
@@ -259,3 +260,11 @@ def test_only_nodes_that_nearly_touch_are_integrated_where_they_will(tmp_path, m
     (tmp_path / "case.yaml").write_text(OBLIQUE.format(step=0.0125, order=1).replace("end: 1", "end: 0.35"))
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
     assert len(places) == 28 + 2
+
+
+def test_ways_along_the_surface_count():
+    """A ring that curls shut turns its ends: along their normals at the beginning of the step they moved apart."""
+    slave, master = 0.3, 0.4  # along the surface, and away
+    difference, none = sparse_from_array(np.array([[1.0, -1.0]])), np.zeros((1, 2))
+    beginning = Beginning(difference, difference, none, np.ones(1), none, np.array([[0.0, -1.0]]))
+    assert beginning.ways(np.array([[slave, 0.0], [0.0, -master]])) == pytest.approx([slave + master])
