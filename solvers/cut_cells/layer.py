@@ -33,29 +33,21 @@ def wall_vertices(x: Array, height: float) -> Array:
 
 
 def flattened(table: CutTable, height: float) -> CutTable:
-    """The table of a layer of this height [m] as that of its plane."""
-    regions, n = len(table.cell), round(table.face_moments.shape[1] ** 0.5)
+    """The table of a layer of this height [m], with one point across it, as that of its plane."""
     piece_region, piece_facet, piece_body, piece_moments = _of_segments(
-        n, height, table.piece_region, table.piece_facet, table.piece_body, table.piece_moments
+        height, table.piece_region, table.piece_facet, table.piece_body, table.piece_moments
     )
     closed_cell, closed_facet, _, closed_moments = _of_segments(
-        n, height, table.closed_cell, table.closed_facet, table.closed_facet, table.closed_moments
+        height, table.closed_cell, table.closed_facet, table.closed_facet, table.closed_moments
     )
-    sides = table.face_axis < 2
     return replace(
         table,
         shape=table.shape[:2],
         vertices=np.ascontiguousarray(table.vertices[::2, :2]),
-        moments=table.moments.reshape(regions, n, n * n).sum(axis=1),
         piece_region=piece_region,
         piece_facet=piece_facet,
         piece_body=piece_body,
         piece_moments=piece_moments,
-        face_axis=table.face_axis[sides],
-        face_cells=table.face_cells[sides],
-        face_regions=table.face_regions[sides],
-        face_area=table.face_area[sides],
-        face_moments=table.face_moments.reshape(-1, n, n).sum(axis=1)[sides],
         closed_cell=closed_cell,
         closed_facet=closed_facet,
         closed_moments=closed_moments,
@@ -63,12 +55,12 @@ def flattened(table: CutTable, height: float) -> CutTable:
 
 
 def _of_segments(
-    n: int, height: float, place: Indices, facet: Indices, body: Indices, moments: Array
+    height: float, place: Indices, facet: Indices, body: Indices, moments: Array
 ) -> tuple[Indices, Indices, Indices, Array]:
     """(place, segment, body, moments) of pieces of segments from those of their triangles, sorted by place."""
     segment, second = np.divmod(facet, 2)
     ends = np.zeros((2, 3, 2))  # the end of the segment that each vertex of its two triangles stands on
     ends[0, [0, 1, 2], [0, 1, 1]] = ends[1, [0, 1, 2], [0, 1, 0]] = 1.0
-    pieces = moments.reshape(len(segment), n, n * n, 3).sum(axis=1) @ ends[second] / height
+    pieces = moments @ ends[second] / height
     first = np.flatnonzero(np.diff(place * (segment.max(initial=0) + 1) + segment, prepend=-1))
     return place[first], segment[first], body[first], np.add.reduceat(pieces, first) if len(first) else pieces

@@ -53,8 +53,9 @@ class CellCutter:
             np.ascontiguousarray(self._body, dtype=np.int64),
             closing,
         )
-        self._kernel = kernels.CellCutter(*choices, only_exact)
-        self._exact = partial(kernels.CellCutter, *choices, True)
+        layer = self._dim == 2
+        self._kernel = kernels.CellCutter(*choices, only_exact, layer)
+        self._exact = partial(kernels.CellCutter, *choices, True, layer)
 
     def cut(self, x: Array, *, keep: bool = True) -> CutTable:
         """The table of vertices x [m], shape (vertices, dim); keep: cells for the next one. Raises CrossingSurfaces."""
@@ -108,9 +109,9 @@ def cut_cells(
     """The fluid outside of all bodies in the cells between grid lines.
 
     edges: increasing grid lines [m] of each direction, 2 or 3 arrays; points: n = 2, 3 or 5 increasing numbers in
-    (0, 1), for L_q; x: vertices of the surfaces [m], shape (vertices, dim); closing: length [m], fluid between facets
-    that face each other is solid where the gap is at most this, 0: nowhere; only_exact: the exact kernel for all cells,
-    slower by ten times and more.
+    (0, 1), in 2D also 7, for L_q; x: vertices of the surfaces [m], shape (vertices, dim); closing: length [m], fluid
+    between facets that face each other is solid where the gap is at most this, 0: nowhere; only_exact: the exact kernel
+    for all cells, slower by ten times and more.
     ValueError for arrays and lengths that do not fit, for cells that are too small beside the extent of the box and the
     surfaces (2^-41 of it), and for a surface whose facets do not turn the same way.
     """

@@ -24,9 +24,9 @@ struct CutCells {
 class CellCutter {
 public:
   CellCutter(const std::vector<Doubles>& edges, const Doubles& points, const Values<const std::int64_t, 2>& facets,
-             const Integers& body, double closing, bool only_exact)
+             const Integers& body, double closing, bool only_exact, bool layer)
     : points_(points.data(), points.data() + points.size()), facets_(facets.data(), facets.data() + facets.size()),
-      body_(body.data(), body.data() + body.size()), closing_(closing), only_exact_(only_exact) {
+      body_(body.data(), body.data() + body.size()), closing_(closing), only_exact_(only_exact), layer_(layer) {
     require(edges.size() == 3, "edges must be 3 arrays");
     require(facets.shape(1) == 3, "facets must have 3 columns");
     require(body.size() == facets.shape(0), "body must have one number for each facet");
@@ -37,7 +37,7 @@ public:
       require(line.size() >= 2 && found == line.end(), "edges must increase");
     }
     const std::size_t n = points_.size();
-    require(n == 2 || n == 3 || n == 5, "points must be 2, 3 or 5 numbers");
+    require(n == 2 || n == 3 || n == 5 || (n == 7 && layer), "points must be 2, 3 or 5 numbers, in a layer also 7");
   }
 
   // keep: for the next table
@@ -57,13 +57,15 @@ public:
       for (const auto& vertex : lattice.vertices)
         for (int d = 0; d < 3; ++d) rounded.push_back(static_cast<double>(vertex[d]) * quantum);
       switch (n) {
-        case 2: table = make<2>(lattice, keep); break;
-        case 3: table = make<3>(lattice, keep); break;
-        default: table = make<5>(lattice, keep);
+        case 2: table = layer_ ? make<2, 1>(lattice, keep) : make<2, 2>(lattice, keep); break;
+        case 3: table = layer_ ? make<3, 1>(lattice, keep) : make<3, 3>(lattice, keep); break;
+        case 5: table = layer_ ? make<5, 1>(lattice, keep) : make<5, 5>(lattice, keep); break;
+        default: table = make<7, 1>(lattice, keep);
       }
     }
     const std::size_t cells = table.state.size(), regions = table.cell.size(), pieces = table.piece_facet.size();
-    const std::size_t faces = table.face_axis.size(), closed = table.closed_facet.size(), all = n * n * n;
+    const std::size_t faces = table.face_axis.size(), closed = table.closed_facet.size();
+    const std::size_t of_face = n * (layer_ ? 1 : n), all = n * of_face;
     return {quantum,
             to_numpy(std::move(rounded), {vertices.shape(0), 3}),
             to_numpy(std::move(table.state), {cells}),
@@ -78,16 +80,16 @@ public:
             to_numpy(std::move(table.face_cells), {faces, 2}),
             to_numpy(std::move(table.face_regions), {faces, 2}),
             to_numpy(std::move(table.face_area), {faces}),
-            to_numpy(std::move(table.face_moments), {faces, n * n}),
+            to_numpy(std::move(table.face_moments), {faces, of_face}),
             to_numpy(std::move(table.closed_cell), {closed}),
             to_numpy(std::move(table.closed_facet), {closed}),
             to_numpy(std::move(table.closed_moments), {closed, all, 3})};
   }
 
 private:
-  template <int N>
+  template <int N, int M>
   cut::Table make(const cut::Lattice& lattice, bool keep) {
-    cut::TableMaker<N> maker(lattice, points_.data(), closing_ / lattice.quantum, only_exact_,
+    cut::TableMaker<N, M> maker(lattice, points_.data(), closing_ / lattice.quantum, only_exact_,
                              std::exchange(memory_, {}), keep);
     cut::Table table = maker.make();
     if (keep) memory_ = maker.memory(table);
@@ -98,7 +100,7 @@ private:
   std::vector<double> points_;
   std::vector<std::int64_t> facets_, body_;
   double closing_;
-  bool only_exact_;
+  bool only_exact_, layer_;  // layer: one layer of cells between walls that stand across it
   cut::Memory memory_;
 };
 
@@ -126,7 +128,7 @@ void bind_cut(nb::module_& module) {
     .def_ro("closed_moments", &CutCells::closed_moments);
   nb::class_<CellCutter>(module, "CellCutter", "Makes tables of the fluid in cut cells, in 3D; see solvers.cut_cells.")
     .def(nb::init<const std::vector<Doubles>&, const Doubles&, const Values<const std::int64_t, 2>&, const Integers&,
-                  double, bool>(),
-         "edges"_a, "points"_a, "facets"_a, "body"_a, "closing"_a, "only_exact"_a)
+                  double, bool, bool>(),
+         "edges"_a, "points"_a, "facets"_a, "body"_a, "closing"_a, "only_exact"_a, "layer"_a)
     .def("cut", &CellCutter::cut, "vertices"_a, "keep"_a);
 }

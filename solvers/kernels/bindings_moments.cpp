@@ -96,9 +96,10 @@ moments::Surface<Dim> to_surface(const AnyArray& vertices, const AnyArray& facet
   return {x.data, nodes.data, static_cast<std::int64_t>(nodes.rows)};
 }
 
-View<double> to_points(const AnyArray& points) {
+View<double> to_points(const AnyArray& points, std::size_t dim) {
   const auto given = view<double>("points", points, 1);
-  require(given.rows >= 2 && given.rows <= 5, "points must be 2 to 5 numbers, not " + std::to_string(given.rows));
+  require((given.rows >= 2 && given.rows <= 5) || (given.rows == 7 && dim == 2),
+          "points must be 2 to 5 numbers, or 7 in 2D, not " + std::to_string(given.rows));
   for (std::size_t a = 0; a < given.rows; ++a)
     require(given.data[a] > (a == 0 ? 0.0 : given.data[a - 1]) && given.data[a] < 1,
             "points must increase within (0, 1)");
@@ -130,7 +131,9 @@ Moments compute(const std::vector<AnyArray>& edges, const View<double>& points, 
       case 2: result = with.template operator()<2>(); break;
       case 3: result = with.template operator()<3>(); break;
       case 4: result = with.template operator()<4>(); break;
-      default: result = with.template operator()<5>();
+      case 5: result = with.template operator()<5>(); break;
+      default:
+        if constexpr (Dim == 2) result = with.template operator()<7>();
     }
   }
   const std::size_t dim = Dim, cells = result.cells.size, pieces = result.piece_facet.size;
@@ -147,7 +150,7 @@ Moments compute(const std::vector<AnyArray>& edges, const View<double>& points, 
 
 Moments py_moments(const std::vector<AnyArray>& edges, const AnyArray& points, const AnyArray& vertices,
                    const AnyArray& facets, const std::optional<AnyArray>& wanted) {
-  const auto given = to_points(points);
+  const auto given = to_points(points, edges.size());
   if (edges.size() == 2) return compute<2>(edges, given, vertices, facets, wanted);
   require(edges.size() == 3, "edges must be 2 or 3 arrays, not " + std::to_string(edges.size()));
   return compute<3>(edges, given, vertices, facets, wanted);
@@ -173,7 +176,7 @@ C cells with surface in them, P pieces: the part of one facet in one cell. Sorte
   module.def("moments", &py_moments, "edges"_a, "points"_a, "vertices"_a, "facets"_a, "wanted"_a = nb::none(),
              R"(Moments of a solid in the cells of a box grid and of its surface, exact to rounding.
 
-edges: increasing grid lines [m] of each direction, 2 or 3 arrays; points: n = 2 to 5 increasing numbers in (0, 1);
+edges: increasing grid lines [m] of each direction, 2 or 3 arrays; points: n = 2 to 5 increasing numbers in (0, 1), or 7 in 2D;
 vertices [m]: (k, dim); facets: (m, dim), int64, the segments (2D) or triangles (3D) of one or several closed
 surfaces; wanted: one flag per cell, the others are left out.
 

@@ -12,10 +12,12 @@
 
 namespace cut {
 
-template <int N>
+// N points along x and y, M along z: N, or 1 in a layer of cells between walls that stand across it, of which all
+// integrands are constant along z.
+template <int N, int M>
 class Integrals {
 public:
-  static constexpr int face_size = N * N, size = N * N * N, rule_size = moments::simplex_rule_size<3>(N);
+  static constexpr int face_size = N * M, size = N * face_size;  // faces: those along x
 
   explicit Integrals(const double* points)
     : basis_(points), triangle_(rules().first), line_(rules().second) {}
@@ -62,7 +64,8 @@ public:
             factor[d] += measure * point.corner[v] * lambda_[at[v]][d];
           }
         factor[3] = projected * x[0];
-        const auto a = basis_.values(x[0]), b = basis_.values(x[1]), c = basis_.values(x[2]);
+        const auto a = basis_.values(x[0]), b = basis_.values(x[1]);
+        const auto c = along_z(x[2]);
         for (int i = 0; i < N; ++i) along[g][i] = a[i] * factor;
         for (int f = 0; f < face_size; ++f) across[g][f] = point.weight * b[f % N] * c[f / N];
       }
@@ -89,7 +92,8 @@ public:
         Point3 x{};
         for (int v = 0; v < 3; ++v)
           for (int d = 0; d < 3; ++d) x[d] += point.corner[v] * (*at[v])[d];
-        const auto a = basis_.values(x[0]), b = basis_.values(x[1]), c = basis_.values(x[2]);
+        const auto a = basis_.values(x[0]), b = basis_.values(x[1]);
+        const auto c = along_z(x[2]);
         const double factor = point.weight * projected * x[0];
         for (int i = 0; i < size; ++i) flux[i] += factor * a[i % N] * b[i / N % N] * c[i / N / N];
       }
@@ -108,14 +112,14 @@ public:
   }
 
   // Adds the part of a side of a polygon in a face; ends: relative to the face, the inside on the left.
-  // l_a of the first coordinate, l_b of the second: [a + N b].
+  // l_a of the first coordinate, l_b of the second: [a + N b], N points along both.
   void add_side(const std::array<double, 2>& from, const std::array<double, 2>& to, double* face) const {
     const double rise = to[1] - from[1];
     if (rise == 0) return;
     for (const auto& [s, weight] : line_) {
       const auto inner = from_zero(from[0] + s * (to[0] - from[0]));
       const auto b = basis_.values(from[1] + s * rise);
-      for (int f = 0; f < face_size; ++f) face[f] += weight * rise * inner[f % N] * b[f / N];
+      for (int f = 0; f < N * N; ++f) face[f] += weight * rise * inner[f % N] * b[f / N];
     }
   }
 
@@ -129,11 +133,21 @@ private:
   // Four numbers the processor works on at once: those of the three lambda_v, and the flux.
   using Lanes [[gnu::vector_size(4 * sizeof(double))]] = double;
 
+  // Total degree of the integrands: 2 N - 1 in a layer, else 3 N - 2.
+  static constexpr int rule = M == 1 ? (2 * N + 2) / 3 : N, rule_size = moments::simplex_rule_size<3>(rule);
+
   using Rules = std::pair<std::vector<moments::SimplexPoint<3>>, std::vector<moments::LinePoint>>;
 
   static const Rules& rules() {
-    static const Rules computed{moments::simplex_rule<3>(N), moments::gauss(N, 0)};
+    static const Rules computed{moments::simplex_rule<3>(rule), moments::gauss(N, 0)};
     return computed;
+  }
+
+  std::array<double, M> along_z(double z) const {
+    if constexpr (M == 1)
+      return {1.0};
+    else
+      return basis_.values(z);
   }
 
   static Point3 cross(const Point3& a, const Point3& b) {

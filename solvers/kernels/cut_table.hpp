@@ -30,7 +30,8 @@ struct Table {
   std::vector<double> closed_moments;
 };
 
-template <int N>
+// N points along x and y and M along z, see `Integrals`.
+template <int N, int M>
 class TableMaker {
 public:
   // closing: length in quanta, 0: none; old: of a table of the same grid, facets, points and choices
@@ -82,7 +83,8 @@ public:
   }
 
 private:
-  static constexpr int size = N * N * N, face_size = N * N;
+  static constexpr int size = N * N * M, face_size = N * M;
+  static constexpr int axes = M == N ? 3 : 2;  // a layer has no faces across it
 
   void compute_cells() {
     keep_cells();
@@ -372,7 +374,7 @@ private:
     for (std::size_t c = 0; c < cells_.size(); ++c) {
       if (!is_mixed(c)) continue;
       const auto at = lattice_.index(candidates_.cells[c]);
-      for (int axis = 0; axis < 3; ++axis) {
+      for (int axis = 0; axis < axes; ++axis) {
         auto beyond = at;
         ++beyond[axis];
         const Side here = side(at), above = side(beyond);
@@ -447,7 +449,7 @@ private:
 
   struct Row {
     std::array<std::int64_t, 2> regions;
-    std::array<double, face_size> moments;  // of the first axis after the normal's fastest
+    std::array<double, N * N> moments;  // of the first axis after the normal's fastest
   };
 
   double* row(const std::array<std::int64_t, 2>& regions) {
@@ -461,20 +463,24 @@ private:
     for (const Row& known : rows_) {
       if (known.regions[0] < 0 && known.regions[1] < 0) continue;
       double area = 0;
-      for (int f = 0; f < face_size; ++f) area += known.moments[f];
+      std::array<double, face_size> moments{};  // the lower one of its axes fastest: of y these are z, x
+      for (int f = 0; f < N * N; ++f) {
+        const int first = axis == 1 ? f / N : f % N, second = axis == 1 ? f % N : f / N;
+        area += known.moments[f];
+        moments[first + N * (second % M)] += known.moments[f];
+      }
       if (axis == 0 && known.regions[0] >= 0)
-        integrals_.add_far_face(known.moments.data(), table_.moments.data() + known.regions[0] * size);
+        integrals_.add_far_face(moments.data(), table_.moments.data() + known.regions[0] * size);
       table_.face_axis.push_back(axis);
       table_.face_cells.insert(table_.face_cells.end(), {below.cell, above.cell});
       table_.face_regions.insert(table_.face_regions.end(), known.regions.begin(), known.regions.end());
       table_.face_area.push_back(area);
-      for (int f = 0; f < face_size; ++f)  // the lower one of its axes fastest: of y these are z, x
-        table_.face_moments.push_back(known.moments[axis == 1 ? f / N + N * (f % N) : f]);
+      table_.face_moments.insert(table_.face_moments.end(), moments.begin(), moments.end());
     }
   }
 
   const Lattice& lattice_;
-  Integrals<N> integrals_;
+  Integrals<N, M> integrals_;
   bool only_exact_, keep_;
   Memory old_;
   Zones zones_;

@@ -75,7 +75,7 @@ PARALLEL = (
 #: what the whole runs of cases take, where it is long [s]
 SECONDS = {
     "cavity_flexible_bottom": 55, "cylinder_2d2": 200, "elastic_tube": 90, "falling_elastic_disc": 200, "flap": 90,
-    "jeffery_orbit": 70, "leaflet_pulsating": 300, "segre_silberberg": 90, "torus_rough": 150,
+    "jeffery_orbit": 70, "leaflet_pulsating": 300, "segre_silberberg": 90, "thin_flag": 180, "torus_rough": 150,
     "torus_wall": 65, "two_tori_friction": 80,
 }  # fmt: skip
 

@@ -57,7 +57,7 @@ def test_integrals_3d(body, grid, n):
             assert identity_errors(found, edges, n, surface).max() < 1e-13
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 7])
 @pytest.mark.parametrize("grid", GRIDS)
 @pytest.mark.parametrize("body", BODIES_2D)
 def test_integrals_2d(body, grid, n):
@@ -194,8 +194,8 @@ LINE = np.linspace(0, 1, 3)
         ({"edges": [LINE, LINE, LINE[:1]]}, "edges[2] must have at least 2 entries"),
         ({"edges": [LINE, np.array([0, 0.5, 0.5]), LINE]}, "edges[1] must increase; entries 1 and 2 do not"),
         ({"edges": [LINE, LINE, np.array([0, np.inf])]}, "edges[2] must be finite; row 1 is not"),
-        ({"points": gauss(6)}, "points must be 2 to 5 numbers, not 6"),
-        ({"points": gauss(1)}, "points must be 2 to 5 numbers, not 1"),
+        ({"points": gauss(6)}, "points must be 2 to 5 numbers, or 7 in 2D, not 6"),
+        ({"points": gauss(1)}, "points must be 2 to 5 numbers, or 7 in 2D, not 1"),
         ({"points": np.array([0.0, 0.5])}, "points must increase within (0, 1)"),
         ({"points": np.array([0.5, 1.0])}, "points must increase within (0, 1)"),
         ({"points": np.array([0.5, 0.2])}, "points must increase within (0, 1)"),

@@ -23,12 +23,22 @@ from solvers.fluid.mesh.distributed_grid import DistributedGrid
 from solvers.mesh.gauss import gauss
 
 
+def count_of_points(velocity_degree: int, dim: int) -> int:
+    """Points in each direction of a cut cell: products of two velocities are integrated exactly.
+
+    With second degree in 2D so is the convective term, a product of three, whose points beyond a wall have the
+    continued parabolas. In 3D it would take three times as many points.
+    """
+    of_velocities = 3 if velocity_degree > 1 and dim == 2 else 2
+    return of_velocities * velocity_degree + 1
+
+
 class Weights:
     """The coefficients of one grid: share of fluid, normal and penalty; zero outside cut cells."""
 
     def __init__(self, grid: DistributedGrid, velocity_degree: int):
         self.grid, dim, self.velocity_degree = grid, grid.dim, velocity_degree
-        points_per_direction = 2 * velocity_degree + 1
+        points_per_direction = count_of_points(velocity_degree, dim)
         self.degree = 2 * points_per_direction - 1
         domain = grid.domain
         self.reference, rule = fem.quadrature_points(domain, self.degree)

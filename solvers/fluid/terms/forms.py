@@ -144,7 +144,7 @@ def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand in cut cells with a film, where viscosity dominates: `bulk` of a flow without convection.
 
     A second-order velocity is a parabola across the film. Its continuation to the rest of the cell is (h / g)^2 times
-    as large. The quadrature of cut cells is exact for products of two such velocities, but not for the products of
+    as large. The quadrature of cut cells is exact for products of two such velocities, in 3D not for the products of
     three in the convective term.
     """
     return bulk(creeping(flow), u, p, v, q)
