@@ -94,7 +94,7 @@ def _start(
 ) -> bool:
     """Start; False: a start step does not converge.
 
-    jump: velocity [m/s] of an impulsive start, zero: none; load: on the vertices [N] without the impulse, None: no one;
+    jump: velocity [m/s] of an impulsive start, zero: none; load: on the vertices [N] without the impulse, None: zero;
     the others as in `start_together`.
     """
     flow, solid, interface = start.flow, start.solid, coupled.interface
