@@ -126,8 +126,8 @@ class Dynamics:
         def switch() -> None:
             constraint.present = present
 
-        def settle(massless: NDArray[np.int64]) -> None:
-            others = np.setdiff1d(np.arange(structure.layout.size), massless)
+        def settle(lighter: NDArray[np.int64]) -> None:
+            others = np.setdiff1d(np.arange(structure.layout.size), lighter)
             held = structure.held.stopped(others, structure.now.u)
             with structure.by(FirstState(damped=structure.damping is not None), held, t, SHORT * dt):
                 structure.solve()

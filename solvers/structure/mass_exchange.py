@@ -1,9 +1,8 @@
 """The exchange of mass when contact pairs appear or disappear: their surfaces lose their mass, or get it back.
 
-If some nodes become massless, all massless ones move to their equilibrium first: those that touch may have to slip.
-Each free piece keeps the velocity of its centre and its angular momentum; what its velocities have besides this rigid
-motion is scaled such that kinetic and internal energy of the body stay together. Then accelerations follow from the
-balance.
+Nodes that have become massless move to their equilibrium first. Each free piece keeps the velocity of its centre and
+its angular momentum; what its velocities have besides this rigid motion is scaled such that kinetic and internal energy
+of the body stay together. Then accelerations follow from the balance.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ def exchange(
 ) -> None:
     """Let `switch` choose other pairs at the present time (collective). Raises StepFailed.
 
-    settle: moves massless nodes, owned dofs, to their equilibrium.
+    settle: moves nodes that have become massless, owned dofs, to their equilibrium.
     """
     comm, piece, count = structure.comm, structure.pieces.of_nodes, structure.pieces.count
     before, energy = structure.inertia.of_pieces(), _internal(structure)
@@ -42,7 +41,7 @@ def exchange(
     changed &= ~_any_by_piece(comm, structure.held.free_part(np.ones(len(massless))) != 1.0, piece, count)
     structure.assemble()
     if comm.allreduce(bool((now_massless & ~massless).any()), op=MPI.LOR):
-        settle(np.flatnonzero(now_massless))
+        settle(np.flatnonzero(now_massless & ~massless))
     after = structure.inertia.of_pieces()
     frame = after.frame(structure.now.u)
     rest = after.split(frame, structure.now.v)
