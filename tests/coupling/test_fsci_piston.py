@@ -59,7 +59,7 @@ def test_a_stopped_column_does_not_pull(tmp_path, coupling):
         ("rho_inf: 0, ", ""),
         ("origin: [1.6, -0.1]", "origin: [1.501, -0.1]"),
         ("end: 0.9", "end: 0.12"),
-        ("scheme: monolithic", f"scheme: {coupling}"),
+        ("coupling: {", f"coupling: {{scheme: {coupling}, "),
     ):
         assert before in text
         text = text.replace(before, after)
