@@ -101,7 +101,10 @@ class Sliding:
         near = ~active & (gap > 0.0) & (gap <= 2.0 * here.ways(way))
         if not near.any():
             return
-        there = self._integrals(x + way, travel)
+        clear = [mortar.clear_until for mortar in self.mortars]
+        there = self._integrals(x + way, travel + float(np.abs(way).max()))
+        for mortar, until in zip(self.mortars, clear, strict=True):
+            mortar.clear_until = until  # no node has gone there
         after = there.gaps(x + way)
         approach = near & (after < gap)
         share = np.divide(gap, gap - after, out=np.zeros_like(gap), where=approach)

@@ -97,7 +97,7 @@ def run(scenes, *, resumed: Sequence[int] = ()):
     return found
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 4, 5))])
+@pytest.mark.parametrize("seed", [0, 1, 3, 5, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 4))])
 def test_pairs_meet_and_part_as_if_each_were_alone(seed):
     rng = np.random.default_rng(seed)
     laws = rng.permutation(list(LAWS))[: 2 + seed % 4]
