@@ -25,8 +25,7 @@ class Scene:
         return [self.origin[0] + x, self.origin[1] + y]
 
     def rectangle(self, size, cells, x=0.0, y=0.0, order=1):
-        mesh = {"shape": "rectangle", "size": size, "cells": cells, "origin": self.at(x, y)}
-        return mesh | ({"order": 2} if order == 2 else {})
+        return {"shape": "rectangle", "size": size, "cells": cells, "order": order, "origin": self.at(x, y)}
 
     def body(self, name, mesh, law="neo_hooke", **settings):
         """A body with a density for which a wave crosses a metre in one step of time."""
